@@ -53,14 +53,14 @@
 /*
  64-bit words of a localizer.
  */
-#define SONARFIX_LOCALIZER_WORDS 231
+#define SONARFIX_LOCALIZER_WORDS 233
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a localizer.
  */
-#define SONARFIX_LOCALIZER_WORDS 226
+#define SONARFIX_LOCALIZER_WORDS 228
 #endif
 
 /*
@@ -91,14 +91,14 @@
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1418
+#define SONARFIX_ROBOT_WORDS 1420
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1381
+#define SONARFIX_ROBOT_WORDS 1383
 #endif
 
 #if defined(SONARFIX_64_BIT)
@@ -459,6 +459,43 @@ enum sonarfix_verdict_t
 typedef enum sonarfix_verdict_t sonarfix_verdict_t;
 #else
 typedef int32_t sonarfix_verdict_t;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
+ What of the robot's configuration is probably wrong.
+ */
+enum sonarfix_mismatch_t
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   Nothing, as far as the ranges tell by now.
+   */
+  SONARFIX_MISMATCH_NONE = 0,
+  /*
+   The noise of wheels or ranges is larger than it says.
+   */
+  SONARFIX_MISMATCH_NOISE_TOO_SMALL = 1,
+  /*
+   Diameters of the wheels or track width are farther from it than its deviations permit.
+   */
+  SONARFIX_MISMATCH_WHEELS_OUTSIDE_PRIOR = 2,
+  /*
+   The same of the place of the first ranger in the robot.
+   */
+  SONARFIX_MISMATCH_MOUNT_SUSPECT = 3,
+  /*
+   Another one, of a newer core.
+   */
+  SONARFIX_MISMATCH_OTHER = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum sonarfix_mismatch_t sonarfix_mismatch_t;
+#else
+typedef int32_t sonarfix_mismatch_t;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -2363,6 +2400,16 @@ sonarfix_status_t sonarfix_localizer_covariance(const sonarfix_localizer_t *loca
 sonarfix_status_t sonarfix_localizer_health(const sonarfix_localizer_t *localizer, sonarfix_health_t *health);
 
 /*
+ Reads what of the configuration is probably wrong.
+
+ @param localizer  an open localizer
+ @param mismatch  gets what is wrong, or SONARFIX_MISMATCH_NONE
+ @return SONARFIX_OK, or an error of a pointer or the handle
+ Threads: one at a time for the localizer.
+ */
+sonarfix_status_t sonarfix_localizer_mismatch(const sonarfix_localizer_t *localizer, sonarfix_mismatch_t *mismatch);
+
+/*
  Reads what determines the pose: always SONARFIX_MODE_TRACKING without a search.
 
  @param localizer  an open localizer
@@ -2739,6 +2786,16 @@ sonarfix_status_t sonarfix_robot_covariance(const sonarfix_robot_t *robot, sonar
  Threads: one at a time for the robot.
  */
 sonarfix_status_t sonarfix_robot_health(const sonarfix_robot_t *robot, sonarfix_health_t *health);
+
+/*
+ Reads what of the configuration of a running robot is probably wrong.
+
+ @param robot  an open robot
+ @param mismatch  gets what is wrong, or SONARFIX_MISMATCH_NONE
+ @return SONARFIX_OK; SONARFIX_ERROR_NOT_RUNNING; or an error of a pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_mismatch(const sonarfix_robot_t *robot, sonarfix_mismatch_t *mismatch);
 
 /*
  Reads the counts of faults, running or not.

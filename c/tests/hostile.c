@@ -241,10 +241,12 @@ static sonarfix_status_t read_robot(void) {
   sonarfix_state_t estimate, deviations;
   sonarfix_covariance_t covariance;
   sonarfix_health_t health;
+  sonarfix_mismatch_t mismatch;
   sonarfix_faults_t faults;
   const sonarfix_robot_t *robot = A_ROBOT;
   sonarfix_robot_covariance(robot, POINTER(covariance));
   sonarfix_robot_health(robot, POINTER(health));
+  sonarfix_robot_mismatch(robot, POINTER(mismatch));
   sonarfix_robot_faults(robot, POINTER(faults));
   sonarfix_status_t status = sonarfix_robot_deviations(robot, &deviations);
   if (status == SONARFIX_OK && sonarfix_robot_state(robot, &estimate) == SONARFIX_OK) check_estimate(&estimate, &deviations);
@@ -342,12 +344,14 @@ static sonarfix_status_t read_localizer(const sonarfix_localizer_t *localizer) {
   sonarfix_gyro_status_t gyro;
   sonarfix_mode_t mode;
   sonarfix_pose_t pose;
+  sonarfix_mismatch_t mismatch;
   uint64_t time_us;
   uint8_t is_missing;
   float association;
   sonarfix_localizer_pose(localizer, POINTER(pose));
   sonarfix_localizer_covariance(localizer, POINTER(covariance));
   sonarfix_localizer_health(localizer, POINTER(health));
+  sonarfix_localizer_mismatch(localizer, POINTER(mismatch));
   sonarfix_localizer_gyro(localizer, POINTER(gyro));
   sonarfix_localizer_mode(localizer, POINTER(mode));
   sonarfix_localizer_time(localizer, POINTER(time_us));

@@ -52,6 +52,7 @@ fn inputs() -> [(&'static str, Vec<u8>); 5] {
         worst_poll: Duration::from_ticks(1_500),
         commands: ReceiverCounters::default(),
         flash: FlashStatus::default(),
+        noise_factor: 1.0,
     };
     let telemetry = |message: Telemetry| input(&bytes(&message));
     let command = |command| input(&bytes(&SessionCommand { session: 5, command }));

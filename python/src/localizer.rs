@@ -419,6 +419,12 @@ impl Localizer {
         verdict(self.get().health().verdict)
     }
 
+    /// What of the robot file is probably wrong: ``"NoiseTooSmall"``, ``"WheelsOutsidePrior"`` or ``"MountSuspect"``, else None.
+    #[getter]
+    fn mismatch(&self) -> Option<String> {
+        self.get().mismatch().map(|mismatch| format!("{mismatch:?}"))
+    }
+
     fn __repr__(&self) -> String {
         let pose = self.get().pose();
         let (x, y, heading) = (pose.x.0, pose.y.0, pose.heading.radians().0);

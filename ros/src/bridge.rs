@@ -80,7 +80,7 @@ impl Bridge {
             config,
             walls,
             is_active: false,
-            monitor: Monitor::default(),
+            monitor: Monitor::of(config.localizer.prior),
             conversation: request::conversation(),
             difference: Difference::default(),
             wheels: None,
@@ -284,7 +284,8 @@ impl Bridge {
     }
 
     fn localization(&self) -> sonarfix_ros_messages::messages::DiagnosticStatus {
-        let health = self.monitor.estimate().map(|estimate| (estimate.health, self.monitor.mode()));
+        let (mode, mismatch) = (self.monitor.mode(), self.monitor.mismatch());
+        let health = self.monitor.estimate().map(|estimate| (estimate.health, mode, mismatch));
         report::localization(health, "the robot")
     }
 

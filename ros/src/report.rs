@@ -2,7 +2,7 @@
 
 use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::geometry::units::Metres;
-use sonarfix::health::{Health, Verdict};
+use sonarfix::health::{Health, Mismatch, Verdict};
 use sonarfix::localizer::{Fix, Mode};
 use sonarfix_ros_messages::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 
@@ -102,8 +102,11 @@ pub fn status(level: u8, name: &str, message: &str, values: Vec<KeyValue>) -> Di
 
 /// The status of the estimate; without one, what it waits for.
 #[must_use]
-pub fn localization(health: Option<(Health, Mode)>, waits_for: &str) -> DiagnosticStatus {
-    let Some((health, of)) = health else {
+pub fn localization(
+    found: Option<(Health, Mode, Option<Mismatch>)>,
+    waits_for: &str,
+) -> DiagnosticStatus {
+    let Some((health, of, mismatch)) = found else {
         return status(
             ERROR,
             "localization",
@@ -112,8 +115,8 @@ pub fn localization(health: Option<(Health, Mode)>, waits_for: &str) -> Diagnost
         );
     };
     let level = match health.verdict {
-        Verdict::Tracking => OK,
-        Verdict::Degraded => WARN,
+        Verdict::Tracking if mismatch.is_none() => OK,
+        Verdict::Tracking | Verdict::Degraded => WARN,
         Verdict::Lost => ERROR,
     };
     let values = vec![
@@ -126,7 +129,9 @@ pub fn localization(health: Option<(Health, Mode)>, waits_for: &str) -> Diagnost
         value("deviation of the position, m", health.position_deviation.0),
         value("deviation of the heading, rad", health.heading_deviation.0),
     ];
-    status(level, "localization", verdict(health.verdict), values)
+    let verdict = verdict(health.verdict);
+    let message = mismatch.map(|mismatch| format!("{verdict}; robot file: {mismatch}"));
+    status(level, "localization", &message.unwrap_or_else(|| verdict.to_owned()), values)
 }
 
 /// The status of the inputs.

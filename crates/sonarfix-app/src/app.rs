@@ -522,6 +522,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             worst_poll: self.worst_poll,
             commands: self.wire.counters(),
             flash: self.store.status(),
+            noise_factor: self.localizer().map_or(1.0, Localizer::noise_factor),
         }
     }
 }

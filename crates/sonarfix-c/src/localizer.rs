@@ -22,10 +22,10 @@ use crate::tracker::Tracker;
 
 /// 64-bit words of a localizer.
 #[cfg(target_pointer_width = "64")]
-pub const SONARFIX_LOCALIZER_WORDS: usize = 231;
+pub const SONARFIX_LOCALIZER_WORDS: usize = 233;
 /// 64-bit words of a localizer.
 #[cfg(not(target_pointer_width = "64"))]
-pub const SONARFIX_LOCALIZER_WORDS: usize = 226;
+pub const SONARFIX_LOCALIZER_WORDS: usize = 228;
 
 /// A localizer in memory of the caller. It must not be copied.
 #[repr(C)]

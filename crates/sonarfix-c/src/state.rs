@@ -5,7 +5,7 @@
 use sonarfix::filter::ekf::{STATES, StandardDeviations, StateEstimate};
 use sonarfix::geometry::pose::Pose;
 use sonarfix::geometry::units::{Instant, Metres, Radians};
-use sonarfix::health::{Health, Verdict};
+use sonarfix::health::{Health, Mismatch, Verdict};
 use sonarfix::localizer::{
     GyroStatus, Localizer, Mode, Start, TurnUse, UNKNOWN_HEADING, UNKNOWN_POSITION,
 };
@@ -205,6 +205,34 @@ impl From<Verdict> for sonarfix_verdict_t {
             Verdict::Tracking => Self::SONARFIX_VERDICT_TRACKING,
             Verdict::Degraded => Self::SONARFIX_VERDICT_DEGRADED,
             Verdict::Lost => Self::SONARFIX_VERDICT_LOST,
+        }
+    }
+}
+
+/// What of the robot's configuration is probably wrong.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum sonarfix_mismatch_t {
+    /// Nothing, as far as the ranges tell by now.
+    SONARFIX_MISMATCH_NONE = 0,
+    /// The noise of wheels or ranges is larger than it says.
+    SONARFIX_MISMATCH_NOISE_TOO_SMALL = 1,
+    /// Diameters of the wheels or track width are farther from it than its deviations permit.
+    SONARFIX_MISMATCH_WHEELS_OUTSIDE_PRIOR = 2,
+    /// The same of the place of the first ranger in the robot.
+    SONARFIX_MISMATCH_MOUNT_SUSPECT = 3,
+    /// Another one, of a newer core.
+    SONARFIX_MISMATCH_OTHER = 4,
+}
+
+impl From<Option<Mismatch>> for sonarfix_mismatch_t {
+    fn from(mismatch: Option<Mismatch>) -> Self {
+        match mismatch {
+            None => Self::SONARFIX_MISMATCH_NONE,
+            Some(Mismatch::NoiseTooSmall) => Self::SONARFIX_MISMATCH_NOISE_TOO_SMALL,
+            Some(Mismatch::WheelsOutsidePrior) => Self::SONARFIX_MISMATCH_WHEELS_OUTSIDE_PRIOR,
+            Some(Mismatch::MountSuspect) => Self::SONARFIX_MISMATCH_MOUNT_SUSPECT,
+            Some(_) => Self::SONARFIX_MISMATCH_OTHER,
         }
     }
 }

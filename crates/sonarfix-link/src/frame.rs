@@ -16,7 +16,7 @@ use crate::message::Message;
 
 /// The version of the frame's content. It is raised whenever the bytes of any message change (`docs/link.md`).
 /// The encoding around the content never changes.
-pub const VERSION: u8 = 10;
+pub const VERSION: u8 = 11;
 /// The longest message, in bytes. A test encodes the largest value of each.
 pub const MESSAGE_MAX: usize = 784;
 /// The longest message of a robot, in bytes. The same test encodes them.

@@ -340,7 +340,7 @@ pub struct ServoReading {
 }
 
 /// The status of the loop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LoopStatus {
     /// The time of the report.
@@ -355,6 +355,8 @@ pub struct LoopStatus {
     pub commands: ReceiverCounters,
     /// The writes to the flash.
     pub flash: FlashStatus,
+    /// [`noise_factor`](sonarfix::localizer::Localizer::noise_factor) of the localizer; 1 without one.
+    pub noise_factor: f32,
 }
 
 /// The writes of a robot to its flash.

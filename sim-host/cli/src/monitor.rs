@@ -47,7 +47,7 @@ pub struct Args {
     /// The robot's map, to draw it and to name its walls.
     #[arg(long, value_name = "MAP")]
     map: Option<PathBuf>,
-    /// The robot file, for the place of the sonar and the track width.
+    /// The robot file, for the place of the sonar, the track width, and wheels that differ from it.
     #[arg(long, value_name = "ROBOT.toml")]
     robot: Option<PathBuf>,
     #[command(flatten)]

@@ -330,10 +330,18 @@ fn calibration(s: &Summary) -> Table {
     };
     Table {
         title: "Calibration at the end".to_owned(),
-        note: "scale errors are relative to the wheels of the robot file".to_owned(),
+        note: format!("scale errors are relative to the wheels of the robot file{}", mismatches(s)),
         columns: ["state", "estimate", "deviation"].map(str::to_owned).to_vec(),
         rows: rows.map(row).to_vec(),
     }
+}
+
+/// A line for each mismatch of the robot file that was named.
+fn mismatches(s: &Summary) -> String {
+    let named = s.health.mismatches.all().into_iter().filter(|&(_, seconds)| seconds > 0.0);
+    let line =
+        |(mismatch, seconds)| format!("\nfor {seconds:.1} s of {:.1} s {mismatch}", s.duration);
+    named.map(line).collect()
 }
 
 fn cell(value: Option<f64>, show: impl Fn(f64) -> String) -> String {

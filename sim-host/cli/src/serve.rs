@@ -96,6 +96,7 @@ pub fn scene(title: String, source: &'static str, floor: &Floor, robot: &RobotCo
         track,
         walls: trace.walls,
         obstacles: Vec::new(),
+        prior: robot.localizer.prior,
     }
 }
 

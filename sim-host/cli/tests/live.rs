@@ -497,6 +497,7 @@ fn scene() -> Scene {
             wall("north", [0.0, 3.0], [4.0, 3.0]),
         ],
         obstacles: Vec::new(),
+        ..Scene::default()
     }
 }
 

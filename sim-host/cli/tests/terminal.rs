@@ -7,7 +7,7 @@ use std::path::Path;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use sonarfix::aim::{Aim, Reason};
-use sonarfix::config::RangerId;
+use sonarfix::config::{Config, RangerId};
 use sonarfix::filter::ekf::{EkfError, StandardDeviations, StateEstimate};
 use sonarfix::geometry::pose::Pose;
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians, SquareMetres};
@@ -145,6 +145,7 @@ fn troubled(faults: Faults) -> (Received, Trace) {
         worst_poll: Duration::from_ticks(123_456),
         commands: ReceiverCounters::default(),
         flash: FlashStatus { writes: 100, failures: 12_345 },
+        noise_factor: 1.0,
     }));
     let name = "behind the blackboard, left of the door".to_owned();
     let wall = sonarfix_sim::trace::Wall { name, from: [0.0, 0.0], to: [4.0, 0.0] };
@@ -351,4 +352,28 @@ fn a_robot_without_images_and_with_a_silent_sonar_is_found() {
     let found = hints_after(&[Telemetry::Estimate(estimate)]);
     assert!(found.contains("no usable range for 10 pings"), "{found}");
     assert!(found.contains("10 ranges in a row do not fit the map"), "{found}");
+}
+
+/// Without a robot file only the noise is judged, with it the wheels as well.
+#[test]
+fn a_robot_that_differs_from_its_file_is_found() {
+    let at = Instant::from_ticks(0);
+    let state = StateEstimate { scale_right: 0.05, scale_left: -0.05, ..Default::default() };
+    let (_, began) = Reporter::resume(at, state, StandardDeviations::default());
+    let Telemetry::Initialized(mut estimate) = began else { unreachable!("{began:?}") };
+    let prior = Config::for_track_width(Metres(0.16)).prior;
+    for (nis, without_file, with_file) in
+        [(1.0, "", "WheelsOutsidePrior"), (2.5, "NoiseTooSmall", "NoiseTooSmall")]
+    {
+        estimate.health.nis = nis;
+        for (monitor, named) in
+            [(Monitor::default(), without_file), (Monitor::of(prior), with_file)]
+        {
+            let mut received = Received { monitor, ..Received::default() };
+            received.send(&Telemetry::Estimate(estimate));
+            let found = hints(&received.monitor).join("\n");
+            assert_eq!(found.is_empty(), named.is_empty(), "{found}");
+            assert!(found.contains(named), "{found}");
+        }
+    }
 }

@@ -55,6 +55,7 @@ fn tick(row: &Row) -> Tick {
             Some("degraded") => Verdict::Degraded,
             _ => Verdict::Tracking,
         },
+        mismatch: None,
         inflations: whole(row, "inflations").unwrap_or_default(),
     };
     let truth = pose(row, ["true_x_m", "true_y_m", "true_heading_rad"]).map(|pose| Truth {

@@ -1,8 +1,9 @@
 //! Errors of the estimate against the reference, its consistency, and the health verdicts.
 
 use serde::Serialize;
-use sonarfix::health::Verdict;
+use sonarfix::health::{Mismatch, Verdict};
 use sonarfix_sim::angle;
+use sonarfix_sim::mismatch::MismatchTimes;
 use sonarfix_sim::trace::{Estimate, Pose};
 
 use crate::median::Median;
@@ -302,15 +303,25 @@ pub struct Verdicts {
     pub lost_seconds: f64,
     /// Whether the verdict was `Lost` at the end.
     pub lost_at_end: bool,
+    /// Time with each mismatch of the robot file named.
+    pub mismatches: MismatchTimes,
+    #[serde(skip)]
+    mismatch: Option<Mismatch>,
     #[serde(skip)]
     until: f64,
 }
 
 impl Verdicts {
+    /// What is named from the latest time on.
+    pub fn name(&mut self, mismatch: Option<Mismatch>) {
+        self.mismatch = mismatch;
+    }
+
     /// Adds the verdict from a time on.
     pub fn note(&mut self, time: f64, before: Verdict, now: Verdict) {
         let lasted = time - self.until;
         self.until = time;
+        self.mismatches.add(lasted, self.mismatch);
         match before {
             Verdict::Tracking => {}
             Verdict::Degraded => self.degraded_seconds += lasted,

@@ -10,6 +10,7 @@ pub mod bound;
 pub mod dense;
 pub mod dense_gyro;
 pub mod integrity;
+pub mod mismatch;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;

@@ -49,6 +49,7 @@ pub fn estimate(localizer: &Localizer) -> Estimate {
         covariance_xy: p[(0, 1)],
         gyro: localizer.gyro().map(|status| gyro(&status)),
         verdict: localizer.health().verdict,
+        mismatch: localizer.mismatch(),
         inflations: localizer.health().inflations,
     }
 }

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 use sonarfix::geometry::units::Radians;
-use sonarfix::health::Verdict;
+use sonarfix::health::{Mismatch, Verdict};
 use sonarfix::localizer::Localizer;
 use sonarfix_hal::robot::Report;
 use sonarfix_map::{Floor, NamedWall};
@@ -64,6 +64,9 @@ pub struct Estimate {
     /// The health verdict.
     #[serde(skip)]
     pub verdict: Verdict,
+    /// What of the robot file is probably wrong.
+    #[serde(skip)]
+    pub mismatch: Option<Mismatch>,
     /// How often the covariance was inflated since the robot was last not lost.
     pub inflations: u16,
 }

@@ -5,6 +5,7 @@ mod fault_campaign;
 mod faults;
 mod find;
 mod floor_plan;
+mod rooms;
 #[path = "../../cli/tests/skipped/mod.rs"]
 mod skipped;
 mod sonar_model;

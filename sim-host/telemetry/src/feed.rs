@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use serde_json::json;
+use sonarfix::config::CalibrationPrior;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_map::Floor;
 use sonarfix_player::columns;
@@ -17,7 +18,7 @@ use sonarfix_sim::trace::{
 use sonarfix_sim::world::obstacle::Obstacle;
 
 /// What the page shows, and what it may ask for.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Scene {
     /// The title of the page.
     pub title: String,
@@ -35,6 +36,9 @@ pub struct Scene {
     /// The unmapped obstacles of a simulation.
     #[serde(skip)]
     pub obstacles: Vec<Obstacle>,
+    /// Of the robot file; exact without one.
+    #[serde(skip)]
+    pub prior: CalibrationPrior,
 }
 
 impl Scene {
@@ -58,6 +62,7 @@ impl Scene {
             track,
             walls,
             obstacles: Vec::new(),
+            prior: robot.map(|robot| robot.localizer.prior).unwrap_or_default(),
         };
         (scene, mount)
     }

@@ -19,6 +19,7 @@ pub fn hints(monitor: &Monitor) -> Vec<String> {
     flash(monitor, &mut hints);
     wheels(monitor, &mut hints);
     sonar(monitor, &mut hints);
+    hints.extend(monitor.mismatch().map(|mismatch| format!("robot file: {mismatch}")));
     hints
 }
 

@@ -26,6 +26,8 @@ pub mod signs;
 pub mod view;
 pub mod wheels;
 
+use sonarfix::config::CalibrationPrior;
+use sonarfix::health::Mismatch;
 use sonarfix::localizer::Fix;
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::{GyroState, LoopStatus, RankedHypothesis, SearchStatus, Telemetry};
@@ -52,6 +54,7 @@ pub struct Monitor {
     search: Option<SearchStatus>,
     hypotheses: Vec<RankedHypothesis>,
     wheels: Wheels,
+    prior: CalibrationPrior,
 }
 
 /// The most hypotheses that are shown.
@@ -67,6 +70,20 @@ pub struct Received {
 }
 
 impl Monitor {
+    /// Before the first message of a robot whose file has this prior.
+    #[must_use]
+    pub fn of(prior: CalibrationPrior) -> Self {
+        Self { prior, ..Self::default() }
+    }
+
+    /// What of the robot file is probably wrong, as far as the latest estimate tells: telemetry has no mount.
+    #[must_use]
+    pub fn mismatch(&self) -> Option<Mismatch> {
+        let Estimate { health, state, .. } = self.estimate.as_ref()?;
+        let noise_factor = self.state.as_ref().map_or(1.0, |status| status.noise_factor);
+        Mismatch::of(health, noise_factor, state, &self.prior)
+    }
+
     /// Processes a received byte; returns the message that it completes.
     pub fn push(&mut self, byte: u8) -> Option<Received> {
         let frame = self.receiver.push(byte)?;

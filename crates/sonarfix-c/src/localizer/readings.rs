@@ -5,8 +5,8 @@
 use super::sonarfix_localizer_t;
 use crate::memory::read;
 use crate::state::{
-    sonarfix_covariance_t, sonarfix_gyro_status_t, sonarfix_health_t, sonarfix_mode_t,
-    sonarfix_pose_t, sonarfix_state_t,
+    sonarfix_covariance_t, sonarfix_gyro_status_t, sonarfix_health_t, sonarfix_mismatch_t,
+    sonarfix_mode_t, sonarfix_pose_t, sonarfix_state_t,
 };
 use crate::status::sonarfix_status_t;
 
@@ -89,6 +89,21 @@ pub unsafe extern "C" fn sonarfix_localizer_health(
 ) -> sonarfix_status_t {
     // SAFETY: the contract of the crate.
     unsafe { read(localizer, health, |tracker| Ok(tracker.localizer().health().into())) }
+}
+
+/// Reads what of the configuration is probably wrong.
+///
+/// @param localizer  an open localizer
+/// @param mismatch  gets what is wrong, or SONARFIX_MISMATCH_NONE
+/// @return SONARFIX_OK, or an error of a pointer or the handle
+/// Threads: one at a time for the localizer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sonarfix_localizer_mismatch(
+    localizer: *const sonarfix_localizer_t,
+    mismatch: *mut sonarfix_mismatch_t,
+) -> sonarfix_status_t {
+    // SAFETY: the contract of the crate.
+    unsafe { read(localizer, mismatch, |tracker| Ok(tracker.localizer().mismatch().into())) }
 }
 
 /// Reads what determines the pose: always SONARFIX_MODE_TRACKING without a search.

@@ -6,7 +6,9 @@ use sonarfix::localizer::Localizer;
 use sonarfix_hal::robot::Faults;
 
 use super::held::{Core, read, sonarfix_robot_t};
-use crate::state::{sonarfix_covariance_t, sonarfix_health_t, sonarfix_state_t};
+use crate::state::{
+    sonarfix_covariance_t, sonarfix_health_t, sonarfix_mismatch_t, sonarfix_state_t,
+};
 use crate::status::{Result, sonarfix_status_t};
 
 /// Counts of faults since the robot was opened.
@@ -115,6 +117,21 @@ pub unsafe extern "C" fn sonarfix_robot_health(
 ) -> sonarfix_status_t {
     // SAFETY: the contract of the crate.
     unsafe { read(robot, health, |core| Ok(localizer(core)?.health().into())) }
+}
+
+/// Reads what of the configuration of a running robot is probably wrong.
+///
+/// @param robot  an open robot
+/// @param mismatch  gets what is wrong, or SONARFIX_MISMATCH_NONE
+/// @return SONARFIX_OK; SONARFIX_ERROR_NOT_RUNNING; or an error of a pointer or the handle
+/// Threads: one at a time for the robot.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sonarfix_robot_mismatch(
+    robot: *const sonarfix_robot_t,
+    mismatch: *mut sonarfix_mismatch_t,
+) -> sonarfix_status_t {
+    // SAFETY: the contract of the crate.
+    unsafe { read(robot, mismatch, |core| Ok(localizer(core)?.mismatch().into())) }
 }
 
 /// Reads the counts of faults, running or not.

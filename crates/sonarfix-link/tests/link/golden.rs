@@ -21,7 +21,7 @@ use crate::messages::{
 use crate::wire::to_stdvec;
 
 /// The version of the bytes below.
-const OF_VERSION: u8 = 10;
+const OF_VERSION: u8 = 11;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"))

@@ -433,6 +433,7 @@ fn state_of_loop(source: &mut impl Source) -> LoopStatus {
             undecodable: source.bits32(),
         },
         flash: FlashStatus { writes: source.bits32(), failures: source.bits32() },
+        noise_factor: source.single(),
     }
 }
 

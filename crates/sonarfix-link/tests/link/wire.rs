@@ -99,7 +99,7 @@ proptest! {
 /// The example of `docs/link.md`, assembled by hand.
 #[test]
 fn the_documents_example_is_right() {
-    const STOP: [u8; 13] = [0x00, 0x04, 0x0a, 0x01, 0x07, 0x07, 0x05, 0x03, 0, 0, 0, 0, 0x00];
+    const STOP: [u8; 13] = [0x00, 0x04, 0x0b, 0x01, 0x07, 0x07, 0x05, 0x03, 0, 0, 0, 0, 0x00];
     let documents = include_str!("../../../../docs/link.md");
     let wire = sent(7, &in_session(&Command::Stop));
     let hex: Vec<_> = wire.iter().map(|byte| format!("{byte:02x}")).collect();

@@ -13,7 +13,7 @@ use crate::association::clutter::Clutter;
 use crate::association::echo::EchoSource;
 use crate::association::reliability::{Reliability, Returned};
 use crate::config::{Config, MAX_RANGERS, RangerId};
-use crate::geometry::numeric::at_least;
+use crate::geometry::numeric::{at_least, between};
 use crate::geometry::units::{Instant, Metres, Radians, SquareMetres, seconds};
 use crate::map::WallId;
 use crate::sensor::echo::EchoParameters;
@@ -286,7 +286,7 @@ impl History {
                 travelled: None,
             };
         };
-        let occlusion = (prior + recent.above_prior(foot, now)).clamp(0.0, MAX_OCCLUSION);
+        let occlusion = between(prior + recent.above_prior(foot, now), 0.0, MAX_OCCLUSION);
         let travelled = recent.used_at.map(|used_at| self.odometer - used_at);
         let own = recent.other.filter(|other| other.ranger == ranger);
         let source = own.map(|other| EchoSource {
@@ -303,8 +303,7 @@ impl History {
     pub fn record_echo(&mut self, entry: &Entry, occluded: f32, echo: Origin, now: Instant) {
         let WallPoint { wall, ranger, foot, prior } = entry.place;
         let persistent = PERSISTENCE * entry.occlusion;
-        let occluded = if occluded > persistent { occluded } else { persistent };
-        let occluded = if occluded < MAX_OCCLUSION { occluded } else { MAX_OCCLUSION };
+        let occluded = between(occluded, persistent, MAX_OCCLUSION);
         let (used_at, other) = match echo {
             Origin::Wall => (Some(self.odometer), entry.other),
             // An echo from elsewhere does not displace a source that is still near.

@@ -25,8 +25,8 @@ const MAX_INCIDENCE: Radians = Radians(75.0 * core::f32::consts::PI / 180.0);
 const MAX_SPOT: Radians = Radians(20.0 * core::f32::consts::PI / 180.0);
 
 /// Uncertainty of the calibration before the first range: standard deviations of the systematic
-/// errors, whose estimates start at zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// errors, whose estimates start at zero. The default is an exact robot.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

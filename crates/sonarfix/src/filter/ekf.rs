@@ -144,6 +144,17 @@ impl Ekf {
         self.mounted.estimate(place, deviation);
     }
 
+    /// Adapts the noise of the wheels to the mean NIS of the ranges.
+    #[inline]
+    pub(crate) fn adapt_noise(&mut self, mean_nis: f32) {
+        self.densities.adapt(mean_nis);
+    }
+
+    /// The noise of the wheels as a multiple of the drive's, as deviations.
+    pub(crate) fn noise_factor(&self) -> f32 {
+        self.densities.wheel_factor()
+    }
+
     /// The place of the sonar, if it is estimated.
     #[inline]
     pub(crate) fn place_of_sonar(&self) -> Option<Point> {

@@ -36,6 +36,16 @@ pub fn at_most(value: f32, most: f32) -> f32 {
     if value < most { value } else { most }
 }
 
+/// A number limited to the range between two positive ones; `most` for NaN.
+///
+/// As in [`positive_part`], integers are compared: positive numbers have the order of their bit patterns.
+#[must_use]
+#[inline]
+pub fn between(value: f32, least: f32, most: f32) -> f32 {
+    let [value, least, most] = [value, least, most].map(|number| number.to_bits().cast_signed());
+    f32::from_bits(value.max(least).min(most).cast_unsigned())
+}
+
 /// The larger of the value and zero.
 ///
 /// Compared as integers, the bit patterns of negative numbers are negative; an integer comparison

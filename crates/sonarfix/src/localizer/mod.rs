@@ -10,10 +10,12 @@
 mod absolute;
 mod measurement;
 mod mode;
+mod mount;
 mod ping;
 mod travel;
 pub(crate) mod unseen;
 
+use self::mount::StatedMount;
 use self::unseen::Unseen;
 use crate::aim::{Aim, Choice, NoAim, Situation, Standing};
 use crate::association::history::History;
@@ -23,7 +25,7 @@ use crate::filter::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate, pose_
 use crate::filter::gyro_fusion::GyroFusion;
 use crate::geometry::pose::Pose;
 use crate::geometry::units::{Duration, Instant, Metres, Radians};
-use crate::health::{Health, Limits};
+use crate::health::{Health, Limits, Mismatch};
 use crate::map::Map;
 use crate::sensor::absolute::{LastStep, Sources};
 
@@ -117,6 +119,7 @@ impl core::error::Error for StartError {}
 #[derive(Debug, Clone)]
 pub struct Localizer<'m> {
     config: Config,
+    mount: StatedMount,
     map: Map<'m>,
     ekf: Ekf,
     health: Health,
@@ -188,6 +191,7 @@ impl<'m> Localizer<'m> {
         let limits = Limits::new(&config.gating, max_heading_deviation_of(&config));
         Ok(Self {
             config,
+            mount: StatedMount::of(&config),
             limits,
             map,
             ekf,
@@ -252,6 +256,7 @@ impl<'m> Localizer<'m> {
     }
 
     /// Begins the period without odometry again after a change of P by something else than odometry.
+    #[inline(never)]
     fn pose_changed(&mut self) {
         if self.unseen.is_some() {
             self.unseen = Some(Unseen::with_pose(&self.ekf, self.recorded));
@@ -366,6 +371,21 @@ impl<'m> Localizer<'m> {
     #[must_use]
     pub fn health(&self) -> Health {
         self.health
+    }
+
+    /// What of the configuration is probably wrong, as far as the ranges tell by now; `None`: nothing. `docs/model.md`, eq. (57).
+    #[must_use]
+    pub fn mismatch(&self) -> Option<Mismatch> {
+        let Self { config, ekf, health, .. } = self;
+        let of_mount = || Mismatch::of_mount(health, self.mount.off(ekf)?, config.prior.mount);
+        Mismatch::of(health, self.noise_factor(), &ekf.state(), &config.prior).or_else(of_mount)
+    }
+
+    /// The noise of the wheels that the filter uses, as a multiple of that of the configuration: from 1 to 4, while the innovations are
+    /// larger than the latter explains (`docs/model.md`, eq. 58).
+    #[must_use]
+    pub fn noise_factor(&self) -> f32 {
+        self.ekf.noise_factor()
     }
 
     /// β, the probability that the echo of the latest ping was that of its wall (`docs/model.md`, eq. 16);

@@ -4,6 +4,7 @@
 //! [`Wall::new`] refuses NaN, infinity and a length that overflows. For a point that is not finite the
 //! functions return NaN or infinity. [`Wall::with_accuracy`] takes any number.
 
+use crate::geometry::numeric::between;
 use crate::geometry::pose::{Heading, Point};
 use crate::geometry::trig::atan2;
 use crate::geometry::units::{Metres, Radians};
@@ -90,7 +91,7 @@ impl Wall {
     /// Without one if it is negative or NaN.
     #[must_use]
     pub fn with_accuracy(self, accuracy: Metres) -> Self {
-        let millimetres = (1e3 * accuracy.0 + 0.5).clamp(1.0, 255.0);
+        let millimetres = between(1e3 * accuracy.0 + 0.5, 1.0, 255.0);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

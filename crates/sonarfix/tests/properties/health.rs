@@ -5,8 +5,8 @@ use sonarfix::config::GatingParameters;
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::units::{Instant, Metres, Radians};
-use sonarfix::health::LOST_AT;
 use sonarfix::health::Verdict::{self, Degraded, Lost, Tracking};
+use sonarfix::health::{LOST_AT, Mismatch};
 use sonarfix::localizer::Start;
 use sonarfix::localizer::{Fix, Localizer};
 use sonarfix::map::{Map, Wall};
@@ -346,7 +346,7 @@ fn ranges_too_far_out_on_average_degrade() {
     let walls = one_wall();
     let mut localizer = with_gating(only_ranges_degrade(), &walls, 0.01);
     let mut degraded = false;
-    for _ in 0..20 {
+    for _ in 0..40 {
         let aim = localizer.aim().unwrap();
         let Fix::Accepted(expected) = localizer.clone().fix(&aim, Some(aim.range)) else {
             panic!()
@@ -354,8 +354,11 @@ fn ranges_too_far_out_on_average_degrade() {
         let out = 2.4 * expected.variance.0.sqrt();
         let fix = localizer.fix(&aim, Some(aim.range + Metres(out)));
         assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
-        degraded |= localizer.health().nis > 3.0;
+        degraded |= localizer.health().nis > 2.0;
         assert_eq!(localizer.health().verdict, if degraded { Degraded } else { Tracking });
+        let is_too_small = degraded || localizer.noise_factor() > 2.0;
+        let expected = is_too_small.then_some(Mismatch::NoiseTooSmall);
+        assert_eq!(localizer.mismatch(), expected);
     }
     assert!(degraded);
 }

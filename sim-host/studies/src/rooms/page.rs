@@ -41,12 +41,13 @@ the level of pins, and steers by its estimate. Parameters are chosen on seeds be
 | noticed | longest time of an error above 20 cm until it ended or the verdict became `Lost`, seconds |
 | wrong | seconds of a run with an error above 10 cm or 0.1 rad and the verdict `Tracking` |
 | not tracking | per cent of the time with the verdict `Degraded` or `Lost` |
+| named | per cent of the runs in which `NoiseTooSmall`, `WheelsOutsidePrior` and `MountSuspect` are [named](model.md#mismatch-with-the-robot-file), for 10 s or longer |
 
 ![All cells: a row for each family with its objects, a block of columns for each sensor](images/rooms.svg)
 
 ";
 
-const COLUMNS: &str = " runs | NEES | inside, % | scale | NIS | RMS, mm | bound, mm | far, % | false, % | lost, % | noticed, s | wrong, s | not tracking, % |";
+const COLUMNS: &str = " runs | NEES | inside, % | scale | NIS | RMS, mm | bound, mm | far, % | false, % | lost, % | noticed, s | wrong, s | not tracking, % | named, % |";
 
 const ROBOTS: &str = "\
 ## Robots that differ from their file
@@ -91,9 +92,10 @@ fn write_head(page: &mut String, names: &str, count: usize) -> std::fmt::Result 
 
 fn write_row(page: &mut String, name: &str, sums: &Sums) -> std::fmt::Result {
     let percent = |count: u32| 100.0 * sums.share(count);
+    let [noise, wheels, mount] = sums.named.map(percent);
     writeln!(
         page,
-        "| {name} | {} | {:.2} | {:.1} | {:+.2} | {:.2} | {:.1} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:.1} |",
+        "| {name} | {} | {:.2} | {:.1} | {:+.2} | {:.2} | {:.1} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:.1} | {noise:.1} / {wheels:.1} / {mount:.1} |",
         sums.runs,
         sums.nees(),
         100.0 * sums.inside(),
@@ -161,14 +163,24 @@ fn write_robots(page: &mut String, results: &Results) -> std::fmt::Result {
     let is_plain = |cell: &Cell| cell.sensor == Sensor::HcSr04 && cell.objects == Objects::Nothing;
     writeln!(page, "{ROBOTS}")?;
     write_head(page, "robot file", 1)?;
-    for robot in Robot::all() {
-        let name = robot.name();
-        write_sum(page, name, results, |cell| is_plain(cell) && cell.robot.name() == name)?;
-    }
-    writeln!(page, "\nThe same, by family:\n")?;
+    let write = |page: &mut String, robots: &[Robot]| {
+        robots.iter().try_for_each(|robot| {
+            let name = robot.name();
+            write_sum(page, name, results, |cell| is_plain(cell) && cell.robot.name() == name)
+        })
+    };
+    write(page, &[Robot::NOMINAL])?;
+    write(page, &Robot::WRONG)?;
+    writeln!(page, "\nOutside of these priors:\n")?;
+    write_head(page, "robot file", 1)?;
+    write(page, &Robot::OUTSIDE)?;
+    writeln!(page, "\nThe robots within these priors whose file is wrong, by family:\n")?;
     write_head(page, "family", 1)?;
     for family in Family::ALL {
-        let is = |cell: &Cell| is_plain(cell) && cell.family == family && !cell.robot.is_nominal();
+        let is = |cell: &Cell| {
+            let is_wrong = !cell.robot.is_nominal() && !cell.robot.is_outside();
+            is_plain(cell) && cell.family == family && is_wrong
+        };
         write_sum(page, family.name(), results, is)?;
     }
     page.push('\n');

@@ -38,6 +38,14 @@ impl Robot {
         Self { name: "servo scale -3 %", believes: |of| servo(of, 0.97, 0.0) },
     ];
 
+    /// Those whose file is wrong by more than its deviations permit.
+    pub const OUTSIDE: [Self; 4] = [
+        Self { name: "wheels ±4 %", believes: |of| wheels(of, [1.04, 0.96]) },
+        Self { name: "wheels ±6 %", believes: |of| wheels(of, [1.06, 0.94]) },
+        Self { name: "track width 20 %", believes: |of| track(of, 1.2) },
+        Self { name: "mount 25 mm ahead", believes: |of| mount(of, [-25.0, 0.0]) },
+    ];
+
     /// Its name.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -47,7 +55,7 @@ impl Robot {
     /// All of them.
     #[must_use]
     pub fn all() -> Vec<Self> {
-        std::iter::once(Self::NOMINAL).chain(Self::WRONG).collect()
+        std::iter::once(Self::NOMINAL).chain(Self::WRONG).chain(Self::OUTSIDE).collect()
     }
 
     /// The scenario of a robot that is as its file describes it, with the file of this one. The robot remains as it is.
@@ -66,6 +74,12 @@ impl Robot {
         let mount = built.localizer.rangers.first.mount;
         truth.mount = [mount.x, mount.y].map(|at| Some(at.0.into()));
         truth.servo_pulses = Some(built.rangers.first.servo_pulses);
+    }
+
+    /// Whether its file is wrong by more than its deviations permit.
+    #[must_use]
+    pub fn is_outside(&self) -> bool {
+        Self::OUTSIDE.iter().any(|other| other.name == self.name)
     }
 
     /// Whether its file is right.

@@ -28,6 +28,8 @@ pub struct Sums {
     /// The longest time until such an error was noticed, seconds.
     pub longest_unnoticed: f64,
     untracked: f64,
+    /// Runs in which each mismatch of the robot file is named, in the order of [`sonarfix_sim::mismatch::MismatchTimes::all`].
+    pub named: [u32; 3],
     /// Sum of the shares of the time with the position inside the 99 % ellipse.
     inside: f64,
 }
@@ -53,6 +55,7 @@ impl Sums {
             wrong_tracking: watch.wrong_tracking(),
             longest_unnoticed: watch.longest_unnoticed(),
             untracked: watch.share_untracked(),
+            named: watch.has_named().map(u32::from),
             inside: result.integrity.share_within_99(),
         }
     }
@@ -62,6 +65,8 @@ impl Sums {
     pub fn plus(mut self, other: &Self) -> Self {
         self.nees.extend(&other.nees);
         self.range_scales.extend(&other.range_scales);
+        let ([noise, wheels, mount], [more_noise, more_wheels, more_mount]) =
+            (self.named, other.named);
         Self {
             runs: self.runs + other.runs,
             nis: (self.nis.0 + other.nis.0, self.nis.1 + other.nis.1),
@@ -73,6 +78,7 @@ impl Sums {
             wrong_tracking: self.wrong_tracking + other.wrong_tracking,
             longest_unnoticed: self.longest_unnoticed.max(other.longest_unnoticed),
             untracked: self.untracked + other.untracked,
+            named: [noise + more_noise, wheels + more_wheels, mount + more_mount],
             inside: self.inside + other.inside,
             ..self
         }

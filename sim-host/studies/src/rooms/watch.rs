@@ -2,6 +2,7 @@
 
 use sonarfix::health::Verdict;
 use sonarfix_sim::angle;
+use sonarfix_sim::mismatch::MismatchTimes;
 use sonarfix_sim::trace::{FixRecord, Pose, Recorder, Tick};
 
 /// A position error beyond this is wrong, and beyond [`FAR`] a failure, metres. Both count in the observable directions alone.
@@ -12,6 +13,9 @@ const WRONG_HEADING: f64 = 0.1;
 /// A run with larger errors at its end is lost: metres, radians.
 const LOST: f64 = 0.5;
 const LOST_HEADING: f64 = 0.26;
+
+/// For how long a mismatch of the robot file is named in a run that counts, seconds.
+const NAMED: f64 = 10.0;
 
 /// The direction in which a room has no wall that a range could measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +56,7 @@ pub struct Watch {
     /// Whether the last tick has an error as of a lost robot.
     is_astray: bool,
     range_scale_deviation: f64,
+    mismatches: MismatchTimes,
 }
 
 impl Watch {
@@ -71,6 +76,7 @@ impl Watch {
             verdict: Verdict::Tracking,
             is_astray: false,
             range_scale_deviation: f64::INFINITY,
+            mismatches: MismatchTimes::default(),
         }
     }
 
@@ -114,6 +120,11 @@ impl Watch {
         self.range_scale_deviation
     }
 
+    /// Whether each mismatch of the robot file was named for ten seconds, in the order of [`MismatchTimes::all`].
+    pub fn has_named(&self) -> [bool; 3] {
+        self.mismatches.all().map(|(_, seconds)| seconds > NAMED)
+    }
+
     fn judge(&mut self, tick: &Tick, truth: Pose) {
         let (estimate, verdict) = (tick.estimate.pose, tick.estimate.verdict);
         let seconds = tick.time - self.last_time;
@@ -135,6 +146,7 @@ impl Watch {
         self.is_astray = off > LOST || turned > LOST_HEADING;
         let [.., range_scale] = tick.estimate.deviation;
         self.range_scale_deviation = range_scale;
+        self.mismatches.add(seconds, tick.estimate.mismatch);
         (self.last_time, self.verdict) = (tick.time, verdict);
         self.ticks += 1;
     }

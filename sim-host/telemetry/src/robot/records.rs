@@ -54,6 +54,7 @@ pub fn tick(estimate: &Estimate, track: f64, odometry: Option<Pose>) -> Tick {
             covariance_xy: 0.0,
             gyro: None,
             verdict: health.verdict,
+            mismatch: None,
             inflations: health.inflations,
         },
         bound: None,
