@@ -34,6 +34,7 @@ _Progress = Callable[[int], object]
 _Region = tuple[float, float, float, float]
 _Outcome = Literal["accepted", "downweighted", "gated", "refused"]
 _Verdict = Literal["tracking", "degraded", "lost"]
+_Mismatch = Literal["NoiseTooSmall", "WheelsOutsidePrior", "MountSuspect"]
 _Mode = Literal["tracking", "searching", "provisional"]
 _Answer = Literal["searching", "several", "along", "nowhere", "unique"]
 
@@ -174,6 +175,8 @@ class Localizer:
     def covariance(self) -> NDArray[np.float32]: ...
     @property
     def verdict(self) -> _Verdict: ...
+    @property
+    def mismatch(self) -> _Mismatch | None: ...
 
 @final
 class Search:

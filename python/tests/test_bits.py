@@ -185,6 +185,19 @@ def test_the_golden_trace_step_by_step(paper):
     assert compared > 600
 
 
+def test_too_little_noise_is_named(paper):
+    """Ranges of which each is within the gate, but all are two deviations too long."""
+    paper.replace(policy="informative").run(0, estimator=Setups)
+    (begin, _), *_ = golden("localizer.golden")
+    localizer = sf.Localizer(Setups.robot, paper.map, struct.unpack_from("<3f", begin, 3))
+    assert localizer.mismatch is None
+    variance = 0.0
+    for _ in range(60):
+        aim = localizer.aim()
+        variance = localizer.fix(aim, aim.range + 2 * variance**0.5).innovation_variance
+    assert localizer.mismatch == "NoiseTooSmall"
+
+
 class Twin:
     """A localizer of its own that gets what the localizer of the run gets."""
 
