@@ -28,7 +28,7 @@ impl StatedMount {
         not(feature = "mount"),
         expect(unused_variables, clippy::unused_self, reason = "nothing is stored")
     )]
-    pub fn off(&self, ekf: &Ekf) -> Option<f32> {
+    pub fn off(self, ekf: &Ekf) -> Option<f32> {
         #[cfg(feature = "mount")]
         return Some(Vector::from(ekf.place_of_sonar()?).minus(self.place.into()).length_squared());
         #[cfg(not(feature = "mount"))]
