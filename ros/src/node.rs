@@ -565,9 +565,8 @@ impl Node {
         let timeline = self.located.as_ref().map(Located::borrow_dependent);
         let navigator = timeline.map(Timeline::navigator);
         let localizer = navigator.map(Navigator::localizer);
-        let found = |it: &Navigator| {
-            (it.localizer().health(), it.mode(), it.localizer().mismatch())
-        };
+        let found =
+            |it: &Navigator| (it.localizer().health(), it.mode(), it.localizer().mismatch());
         let health = navigator.map(found);
         let has_walls = self.walls.is_some() || localizer.is_some();
         let waits_for = if has_walls { "odometry" } else { "a map" };
