@@ -63,7 +63,7 @@ impl RunStatistics {
         }
         let estimate = &tick.estimate;
         self.health.note(tick.time - first, self.verdict, estimate.verdict);
-        self.health.name(estimate.mismatch);
+        self.health.note_mismatch(estimate.mismatch);
         self.verdict = estimate.verdict;
         if let Some(truth) = &tick.truth {
             let at = (tick.time - first, self.distance);

@@ -312,8 +312,8 @@ pub struct Verdicts {
 }
 
 impl Verdicts {
-    /// What is named from the latest time on.
-    pub fn name(&mut self, mismatch: Option<Mismatch>) {
+    /// Adds the mismatch from the latest time on.
+    pub fn note_mismatch(&mut self, mismatch: Option<Mismatch>) {
         self.mismatch = mismatch;
     }
 

@@ -561,7 +561,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let now = estimators.localizer().health().verdict;
         let since_start = estimators.since_start(time);
         self.tally.verdicts.note(since_start, before, now);
-        self.tally.verdicts.name(estimators.localizer().mismatch());
+        self.tally.verdicts.note_mismatch(estimators.localizer().mismatch());
         self.score.note_verdict((since_start, self.tally.distance), now);
     }
 

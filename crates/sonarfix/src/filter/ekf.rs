@@ -146,13 +146,13 @@ impl Ekf {
 
     /// Adapts the noise of the wheels to the mean NIS of the ranges.
     #[inline]
-    pub(crate) fn adapt_noise(&mut self, mean_nis: f32) {
-        self.densities.adapt(mean_nis);
+    pub(crate) fn adapt_noise(&mut self, drive: &Drive, mean_nis: f32) {
+        self.densities.adapt(drive, mean_nis);
     }
 
     /// The noise of the wheels as a multiple of the drive's, as deviations.
-    pub(crate) fn noise_factor(&self) -> f32 {
-        self.densities.wheel_factor()
+    pub(crate) fn noise_factor(&self, drive: &Drive) -> f32 {
+        self.densities.wheel_factor(drive)
     }
 
     /// The place of the sonar, if it is estimated.

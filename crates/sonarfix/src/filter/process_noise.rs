@@ -18,13 +18,16 @@ const DECREASE: f32 = 1.0 / 2048.0;
 /// The largest variance as a multiple of that of the drive: four times its deviation.
 const MOST: f32 = 16.0;
 
+/// Variance of the advance that a drive states, m²/m: `σ_w²`/4.
+fn advance(drive: &Drive) -> f32 {
+    0.25 * drive.wheel_noise.0.0 * drive.wheel_noise.0.0
+}
+
 /// Noise of a drive, as variances per metre of the distance of both wheels together, |ΔR| + |ΔL|.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseDensities {
     /// Of the advance Δs: `σ_w²`/4, m²/m.
     advance: f32,
-    /// The same by the drive alone: the other one is from 1 to [`MOST`] times as large.
-    stated: f32,
     /// Of the difference of the scale errors: `σ_S²`, 1/m. The difference of two independent random walks has twice the variance of
     /// one, their mean half of it.
     scale_difference: f32,
@@ -37,10 +40,8 @@ impl NoiseDensities {
     #[must_use]
     pub fn new(drive: &Drive) -> Self {
         let square = |sigma: f32| sigma * sigma;
-        let advance = 0.25 * square(drive.wheel_noise.0.0);
         Self {
-            advance,
-            stated: advance,
+            advance: advance(drive),
             scale_difference: square(drive.scale_walk.0),
             track_width_error: 0.5 * square(drive.track_width_walk.0.0),
         }
@@ -49,18 +50,19 @@ impl NoiseDensities {
     // ===== Eq. (58): adaptation of the noise of the wheels =====
     /// Increases the noise of the wheels while the mean NIS is too large for it, and decreases it again, never below that of the drive.
     #[inline]
-    pub(crate) fn adapt(&mut self, mean_nis: f32) {
+    pub(crate) fn adapt(&mut self, drive: &Drive, mean_nis: f32) {
+        let stated = advance(drive);
         if mean_nis > INCREASE_ABOVE {
-            self.advance += INCREASE * (MOST * self.stated - self.advance);
+            self.advance += INCREASE * (MOST * stated - self.advance);
         } else {
-            self.advance += DECREASE * (self.stated - self.advance);
+            self.advance += DECREASE * (stated - self.advance);
         }
     }
 
     /// The noise of the wheels as a multiple of the drive's, as deviations.
     #[must_use]
-    pub(crate) fn wheel_factor(&self) -> f32 {
-        sqrt(self.advance / self.stated)
+    pub(crate) fn wheel_factor(&self, drive: &Drive) -> f32 {
+        sqrt(self.advance / advance(drive))
     }
 
     /// Whether every density is within the limits of a variance.
@@ -131,25 +133,23 @@ mod tests {
     use super::*;
     use crate::geometry::units::{Metres, PerRootMetre};
 
-    fn densities() -> NoiseDensities {
-        NoiseDensities::new(&Drive {
-            track_width: Metres(0.16),
-            wheel_noise: PerRootMetre(Metres(0.001)),
-            scale_walk: PerRootMetre(1e-5),
-            track_width_walk: PerRootMetre(Metres(1e-5)),
-        })
-    }
+    const DRIVE: Drive = Drive {
+        track_width: Metres(0.16),
+        wheel_noise: PerRootMetre(Metres(0.001)),
+        scale_walk: PerRootMetre(1e-5),
+        track_width_walk: PerRootMetre(Metres(1e-5)),
+    };
 
     proptest! {
         /// Whatever the mean NIS was, the noise is one to four times that of the drive, and follows (58) in f64.
         #[test]
         fn the_noise_is_adapted_within_its_limits(means in prop::collection::vec(0.0_f32..4.0, 1..400)) {
-            let mut densities = densities();
+            let mut densities = NoiseDensities::new(&DRIVE);
             let mut variance = 1.0_f64;
             for mean in means {
-                densities.adapt(mean);
+                densities.adapt(&DRIVE, mean);
                 variance += if mean > 1.5 { (16.0 - variance) / 32.0 } else { (1.0 - variance) / 2048.0 };
-                let factor = f64::from(densities.wheel_factor());
+                let factor = f64::from(densities.wheel_factor(&DRIVE));
                 prop_assert!((factor - variance.sqrt()).abs() < 1e-3 * factor);
                 prop_assert!((0.999..4.001).contains(&factor));
             }
@@ -159,12 +159,12 @@ mod tests {
     /// A wrong file has twice its noise within eight ranges and 3.9 times within 100; a right one is used again within twenty thousand.
     #[test]
     fn the_noise_returns_to_that_of_the_drive() {
-        let mut adapted = densities();
-        (0..8).for_each(|_| adapted.adapt(1.51));
-        assert!(adapted.wheel_factor() > 2.0);
-        (0..92).for_each(|_| adapted.adapt(1.51));
-        assert!(adapted.wheel_factor() > 3.9);
-        (0..20_000).for_each(|_| adapted.adapt(1.5));
-        assert!(adapted.wheel_factor() < 1.001);
+        let mut adapted = NoiseDensities::new(&DRIVE);
+        (0..8).for_each(|_| adapted.adapt(&DRIVE, 1.51));
+        assert!(adapted.wheel_factor(&DRIVE) > 2.0);
+        (0..92).for_each(|_| adapted.adapt(&DRIVE, 1.51));
+        assert!(adapted.wheel_factor(&DRIVE) > 3.9);
+        (0..20_000).for_each(|_| adapted.adapt(&DRIVE, 1.5));
+        assert!(adapted.wheel_factor(&DRIVE) < 1.001);
     }
 }

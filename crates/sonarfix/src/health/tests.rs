@@ -36,10 +36,10 @@ fn a_health_that_is_lost_has_its_evidence_and_uncertainty() {
 /// A hundredth of ν²/S, at most 25, enters the mean.
 #[test]
 fn the_mean_nis_remembers_a_hundred_ranges() {
-    for (deviations, expected) in [(2.0, 1.03), (10.0, 1.24)] {
+    for (deviations, expected) in [(2.0, 1.0 + 0.01 * 3.0), (10.0, 1.0 + 0.01 * 24.0)] {
         let mut health = Health::default();
         health.record_fix(&accepted(deviations), 0.0, false, CERTAIN, &LIMITS);
-        assert!((health.nis - expected).abs() < 1e-6);
+        assert_eq!(health.nis.to_bits(), f32::to_bits(expected));
     }
 }
 
@@ -50,7 +50,7 @@ fn the_mean_nis_is_that_of_one_number() {
         let mut health = Health::default();
         let fix = AbsoluteFix::Accepted(Agreement { nis: 12.0, dimensions: 3 });
         health.record_absolute(&fix, has_position, 0.0, false, CERTAIN, &LIMITS);
-        assert!((health.nis - 1.03).abs() < 1e-6, "{has_position}");
+        assert_eq!(health.nis.to_bits(), f32::to_bits(1.0 + 0.01 * 3.0), "{has_position}");
     }
 }
 

@@ -136,7 +136,7 @@ impl Localizer<'_> {
             use_number(ekf, &prediction, innovation, noise, found.association, bias)?
         };
         if fix.innovation_used().is_some() {
-            self.ekf.adapt_noise(self.health.nis);
+            self.ekf.adapt_noise(&self.config.drive, self.health.nis);
             self.pose_changed();
             self.mount_changed();
         }

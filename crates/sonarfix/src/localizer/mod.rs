@@ -385,7 +385,7 @@ impl<'m> Localizer<'m> {
     /// larger than the latter explains (`docs/model.md`, eq. 58).
     #[must_use]
     pub fn noise_factor(&self) -> f32 {
-        self.ekf.noise_factor()
+        self.ekf.noise_factor(&self.config.drive)
     }
 
     /// β, the probability that the echo of the latest ping was that of its wall (`docs/model.md`, eq. 16);
