@@ -111,7 +111,8 @@ fn under_load() -> anyhow::Result<()> {
 fn loaded(arguments: &str) -> anyhow::Result<()> {
     let run = "run --quiet --release --bin sonarfix -- pil";
     let text = cargo::printed(cargo::command(&format!("{run} {arguments}")))?;
-    println!("── sonarfix pil {arguments}\n{text}");
+    // The table of docs/pil.md is the standard output.
+    eprintln!("── sonarfix pil {arguments}\n{text}");
     ensure!(text.contains("\n0 deadlines missed"), "a deadline was missed under load");
     Ok(())
 }
