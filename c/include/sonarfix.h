@@ -53,14 +53,14 @@
 /*
  64-bit words of a localizer.
  */
-#define SONARFIX_LOCALIZER_WORDS 233
+#define SONARFIX_LOCALIZER_WORDS 232
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a localizer.
  */
-#define SONARFIX_LOCALIZER_WORDS 228
+#define SONARFIX_LOCALIZER_WORDS 227
 #endif
 
 /*
@@ -91,14 +91,14 @@
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1420
+#define SONARFIX_ROBOT_WORDS 1419
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1383
+#define SONARFIX_ROBOT_WORDS 1382
 #endif
 
 #if defined(SONARFIX_64_BIT)
