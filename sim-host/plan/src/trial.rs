@@ -27,8 +27,8 @@ pub const PERIOD: f64 = 0.066;
 const EVALUATIONS: u16 = 66 * EVALUATIONS_PER_MILLISECOND;
 /// Pings with which a search begins.
 const LEAST_PINGS: usize = 12;
-/// The largest systematic error of a wheel.
-const WHEEL_ERROR: f64 = 0.01;
+/// The largest systematic error of a wheel; that of each is uniform.
+pub const WHEEL_ERROR: f64 = 0.01;
 /// The largest deviation of the servo from the bearing, radians.
 const SERVO_ERROR: f64 = 0.02;
 /// A pose within these errors is right, metres and radians.

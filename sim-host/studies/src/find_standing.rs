@@ -88,8 +88,8 @@ impl Summary {
     /// The summary of some trials with their bound.
     #[must_use]
     pub fn bounded(trials: &[Bounded]) -> Self {
-        let possible = share(trials, |it| it.is_right && is_soon(it.possible_after));
-        let wrong = share(trials, |it| it.possible_after.is_some() && !it.is_right);
+        let possible = share(trials, |it| it.exact.is_right && is_soon(it.exact.after));
+        let wrong = share(trials, |it| it.exact.after.is_some() && !it.exact.is_right);
         let searches: Vec<Trial> = trials.iter().map(|bounded| bounded.trial).collect();
         let [possible_within_3, possible_wrong] = [possible, wrong].map(Some);
         Self { possible_within_3, possible_wrong, ..Self::new(&searches) }

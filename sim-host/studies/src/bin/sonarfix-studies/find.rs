@@ -42,7 +42,8 @@ pub struct Args {
     /// Gives each robot the map of another floor plan of the same kind: every answer is wrong.
     #[arg(long, requires = "floor_plans", conflicts_with = "walls")]
     other_map: bool,
-    /// Computes for each trial how soon its pings allow to find the pose: a grid of poses, with the odometry known exactly.
+    /// Computes for each trial how soon its pings allow to find the pose: a grid of poses, with exact odometry and with that of the
+    /// encoders.
     #[arg(long, requires = "floor_plans", conflicts_with = "other_map")]
     bound: bool,
     #[command(flatten)]
@@ -92,14 +93,17 @@ fn bound(plans: &Plans, args: &Args, runs: Runs) -> anyhow::Result<()> {
 
 pub fn bound_table(trials: &[Bounded]) -> Table {
     let row = |bounded: &Bounded| {
-        let possible = output::found(bounded.possible_after, bounded.is_right);
+        let bounds = [bounded.exact, bounded.measured];
+        let [exact, measured] = bounds.map(|bound| output::found(bound.after, bound.is_right));
         let found = output::found(bounded.trial.unique_after, true);
-        vec![bounded.trial.seed.to_string(), possible, found]
+        vec![bounded.trial.seed.to_string(), exact, measured, found]
     };
     Table {
         title: "Trials".to_owned(),
         note: String::new(),
-        columns: ["seed", "possible after", "found after"].map(str::to_owned).into(),
+        columns: ["seed", "possible after, exact odometry", "by the encoders", "found after"]
+            .map(str::to_owned)
+            .into(),
         rows: trials.iter().map(row).collect(),
     }
 }
@@ -111,14 +115,19 @@ fn times_table(times: &Times, seconds: f64) -> Table {
         let times = [of.half, of.four_fifths, of.nineteen_twentieths].map(time);
         [vec![share.to_owned()], times.into(), vec![percent(of.wrong)]].concat()
     };
+    let ratio = |of: Option<f64>| of.map_or("-".to_owned(), |ratio| format!("{ratio:.2}"));
+    let [exact, measured] = [times.ratio_exact, times.ratio_measured].map(ratio);
     Table {
         title: format!("{} trials of at most {seconds} s", times.trials),
         note: format!(
-            "time of the search over the bound, median: {}",
-            times.ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.2}"))
+            "time of the search over the bound, median: {exact} with exact odometry, {measured} by the encoders"
         ),
         columns: ["", "50 %", "80 %", "95 %", "wrong"].map(str::to_owned).into(),
-        rows: vec![row("bound", &times.possible), row("search", &times.found)],
+        rows: vec![
+            row("bound, exact odometry", &times.exact),
+            row("bound, by the encoders", &times.measured),
+            row("search", &times.found),
+        ],
     }
 }
 
