@@ -1,10 +1,12 @@
-//! Writes a simulated drive as messages, one a line, with the robot file and the map beside it: `drive FOLDER SECONDS`.
+//! Writes a simulated drive as messages, one a line, with the robot file and the map beside it, and the file of a robot that turns while
+//! it searches: `drive FOLDER SECONDS`.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Context;
 use serde_json::json;
+use sonarfix_hal::config::{RobotConfig, SearchMotion, SearchMotionKind, StartPose};
 use sonarfix_map::robot_file;
 use sonarfix_ros::drive::Drive;
 use sonarfix_ros::node::Input;
@@ -36,7 +38,11 @@ fn main() -> anyhow::Result<()> {
     std::fs::create_dir_all(&folder)?;
     std::fs::write(folder.join("drive.jsonl"), lines)?;
     std::fs::write(folder.join("start.json"), json!(drive.start).to_string())?;
-    std::fs::write(folder.join("robot.toml"), robot_file::text(&drive.scenario.robot))?;
+    let robot = drive.scenario.robot;
+    let motion = SearchMotion { kind: SearchMotionKind::Spin, bumper: SearchMotion::BUMPER };
+    let start = StartPose::Exploring { region: None, motion };
+    std::fs::write(folder.join("robot.toml"), robot_file::text(&robot))?;
+    std::fs::write(folder.join("turning.toml"), robot_file::text(&RobotConfig { start, ..robot }))?;
     std::fs::write(folder.join("map.toml"), drive.scenario.floor.to_toml())?;
     Ok(())
 }

@@ -45,7 +45,7 @@ fn main() -> anyhow::Result<()> {
     let (queue, back) = async_channel::unbounded();
     echo_all!(&mut graph, &mut publishers, &queue;
         Clock PoseWithCovarianceStamped TFMessage Odometry OccupancyGrid JointState Range Imu LaserScan
-        DiagnosticArray MarkerArray ParticleCloud Status);
+        DiagnosticArray MarkerArray ParticleCloud Status Twist);
     smol::block_on(executor.run(async {
         while let Ok(back) = back.recv().await {
             back(&publishers);

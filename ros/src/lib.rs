@@ -7,6 +7,7 @@
 //! | [`problem`] | what can be wrong with the inputs, by name |
 //! | [`motion`] · [`turns`] · [`ranges`] · [`walls`] | messages as travels of wheels, turns, ranges along bearings, and walls |
 //! | [`timeline`] | the localizer, which takes late ranges at their time |
+//! | [`search_motion`] | the motion that the node requests while it searches |
 //! | [`view`] · [`markers`] · [`report`] | the estimate as messages |
 //! | [`publication`] · [`interfaces`] · [`descriptors`] | what is published; the services' messages; parameters as such |
 //! | [`bridge`] | a robot with our firmware behind a serial link |
@@ -37,6 +38,7 @@ pub mod program;
 pub mod publication;
 pub mod ranges;
 pub mod report;
+pub mod search_motion;
 pub mod timeline;
 pub mod turns;
 pub mod view;

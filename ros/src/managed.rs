@@ -138,17 +138,24 @@ impl Managed {
     fn work(&mut self, transition: Transition) -> anyhow::Result<()> {
         match transition {
             Transition::Configure => self.core = Some(configured(&self.parameters)?),
-            Transition::Activate | Transition::Deactivate => {
-                let is_active = transition == Transition::Activate;
-                match &mut self.core {
-                    Some(Core::Host(node)) => node.set_active(is_active),
-                    Some(Core::Bridge(bridge)) => bridge.set_active(is_active),
-                    None => {}
-                }
+            Transition::Activate => self.set_active(true),
+            Transition::Deactivate => self.set_active(false),
+            Transition::Cleanup | Transition::Shutdown => {
+                self.set_active(false);
+                self.core = None;
             }
-            Transition::Cleanup | Transition::Shutdown => self.core = None,
         }
         Ok(())
+    }
+
+    fn set_active(&mut self, is_active: bool) {
+        match &mut self.core {
+            Some(Core::Host(node)) => {
+                self.effects.extend(node.set_active(is_active).map(Effect::Publish));
+            }
+            Some(Core::Bridge(bridge)) => bridge.set_active(is_active),
+            None => {}
+        }
     }
 
     /// Answers `change_state`.

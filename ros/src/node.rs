@@ -14,18 +14,19 @@ use sonarfix_map::robot_file;
 use sonarfix_ros_messages::geometry;
 use sonarfix_ros_messages::messages::{
     Imu, JointState, LaserScan, OccupancyGrid, Odometry, PoseWithCovarianceStamped, RangeHeard,
-    TFMessage,
+    TFMessage, Twist,
 };
 use sonarfix_search::navigator::Navigator;
 use sonarfix_search::search::{Search, SearchParameters};
 
 use crate::markers::{self, Drawn};
-use crate::motion::{Motion, Odometer, Planar, Wheels, between, moved, seconds};
+use crate::motion::{Motion, Odometer, Part, Planar, Wheels, between, moved, seconds};
 use crate::parameters::Parameters;
 use crate::problem::{Nanoseconds, Problem, Problems};
 use crate::publication::Output;
 use crate::ranges::Ranges;
 use crate::report::{self, Outcomes};
+use crate::search_motion::MotionRequests;
 use crate::timeline::{Ahead, Heard, Timeline};
 use crate::turns::Turns;
 use crate::view::{Frames, View, particles};
@@ -110,6 +111,8 @@ pub struct Node {
     /// When the last range of each ranger arrived.
     heard_ranges: Vec<Option<Nanoseconds>>,
     drawn: VecDeque<Drawn>,
+    /// `None` without `search_motion_topic`.
+    motion_requests: Option<MotionRequests>,
     now: Nanoseconds,
     /// When the last odometry arrived.
     heard_odometry: Option<Nanoseconds>,
@@ -152,6 +155,7 @@ impl Node {
             bearings.is_empty() || bearings.len() == topics,
             "range_bearings: it needs a bearing for each of the {topics} range_topics, or none"
         );
+        let motion_requests = MotionRequests::of(parameters, &config)?;
         let wheels = Wheels {
             track_width: f64::from(config.localizer.drive.track_width.0),
             max_speed: f64::from(config.localizer.max_wheel_speed.0),
@@ -174,6 +178,7 @@ impl Node {
             located: None,
             problems: Problems::default(),
             drawn: VecDeque::new(),
+            motion_requests,
             now: 0,
             heard_odometry: None,
             published_pose: None,
@@ -182,9 +187,11 @@ impl Node {
         })
     }
 
-    /// Begins or ends to publish.
-    pub fn set_active(&mut self, is_active: bool) {
+    /// Begins or ends to publish; returns the last message, if there is one.
+    pub fn set_active(&mut self, is_active: bool) -> Option<Output> {
         self.is_active = is_active;
+        let requests = self.motion_requests.as_mut().filter(|_| !is_active)?;
+        requests.stop().map(Output::Velocity)
     }
 
     /// Takes the parameters that have changed.
@@ -234,7 +241,19 @@ impl Node {
         }
         self.hear_waiting(&mut out);
         self.publish_report(&mut out);
-        if self.is_active { out } else { Vec::new() }
+        if !self.is_active {
+            return Vec::new();
+        }
+        out.extend(self.requested_velocity().map(Output::Velocity));
+        out
+    }
+
+    /// The velocity of a robot that searches, if it is to be published.
+    fn requested_velocity(&mut self) -> Option<Twist> {
+        let timeline = self.located.as_ref().map(Located::borrow_dependent);
+        let is_searching = timeline.is_some_and(Timeline::is_searching);
+        let timeout = self.parameters.nanoseconds("odometry_timeout");
+        self.motion_requests.as_mut()?.due(is_searching, timeout, self.now)
     }
 
     fn report(&mut self, problem: Problem) {
@@ -300,6 +319,7 @@ impl Node {
             self.locate(at);
         } else if is_first || motion.is_clock_reset {
             self.turns.forget();
+            self.begin_motion_anew();
             let since = motion.parts.first().map_or(at, |part| part.from);
             self.with_timeline(|timeline| timeline.set_clock(since));
         }
@@ -311,11 +331,7 @@ impl Node {
             if has_gyro && part.turn.is_none() {
                 self.report(Problem::ImuGap);
             }
-            match self.with_timeline(|timeline| timeline.advance(&part)) {
-                Some(Ok(heard)) => self.record(&heard),
-                Some(Err(_)) => self.report(Problem::OdometryRefused),
-                None => {}
-            }
+            self.advance(&part);
         }
         let unplaced = self.with_timeline(|timeline| {
             // A method's path has one lifetime, and this closure any.
@@ -326,6 +342,30 @@ impl Node {
         }
         if is_new || is_first {
             self.publish_estimate(false, out);
+        }
+    }
+
+    /// Takes a travel with the ranges in it.
+    fn advance(&mut self, part: &Part) {
+        match self.with_timeline(|timeline| timeline.advance(part)) {
+            Some(Ok(heard)) => {
+                let history = self.parameters.nanoseconds("history");
+                if let Some(requests) = &mut self.motion_requests {
+                    requests.travel(part, history, self.now);
+                }
+                self.record(&heard);
+            }
+            Some(Err(_)) => {
+                self.report(Problem::OdometryRefused);
+                self.begin_motion_anew();
+            }
+            None => {}
+        }
+    }
+
+    fn begin_motion_anew(&mut self) {
+        if let Some(requests) = &mut self.motion_requests {
+            requests.begin_anew();
         }
     }
 
@@ -483,8 +523,11 @@ impl Node {
         }
     }
 
-    /// Counts outcomes and keeps the pings for the drawing.
+    /// Counts outcomes and keeps the pings, for the motion and for the drawing.
     fn record(&mut self, heard: &[Heard]) {
+        if let Some(requests) = &mut self.motion_requests {
+            requests.hear(heard, self.now);
+        }
         let Some(view) = self.view() else { return };
         for heard in heard {
             let ranger = heard.beam.ranger;

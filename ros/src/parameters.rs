@@ -334,6 +334,11 @@ fn outputs() -> Vec<Parameter> {
             "Period of diagnostics, markers and calibration, s",
         )),
         flag("publish_markers", true, "Publishes walls, pings, ellipse and hypotheses as markers"),
+        text(
+            "search_motion_topic",
+            "",
+            "`host`: topic of the velocities of a robot that searches, as `search_motion` of the robot file has them. Empty: none",
+        ),
     ]
 }
 

@@ -9,7 +9,7 @@ use smol::{LocalExecutor, Task, Timer};
 use sonarfix_link::Command;
 use sonarfix_ros_messages::messages::{
     Clock, DiagnosticArray, Imu, JointState, LaserScan, MarkerArray, OccupancyGrid, Odometry,
-    ParticleCloud, PoseWithCovarianceStamped, Range, RangeHeard, Status, TFMessage,
+    ParticleCloud, PoseWithCovarianceStamped, Range, RangeHeard, Status, TFMessage, Twist,
 };
 
 use crate::arguments::Arguments;
@@ -305,7 +305,7 @@ impl Program {
                 break;
             }
         }
-        // The response to the request and the last event leave before the end.
+        // The response to the request, the last event and the last velocity leave before the end.
         Timer::after(std::time::Duration::from_millis(200)).await;
         Ok(())
     }
@@ -337,7 +337,7 @@ impl Program {
                     eprintln!("{}: {}", change.transition.label(), change.to.label());
                     match (change.from, change.to) {
                         (State::Unconfigured, State::Inactive) => self.connect()?,
-                        (_, State::Unconfigured | State::Finalized) => self.disconnect(),
+                        (_, State::Unconfigured) => self.disconnect(),
                         _ => {}
                     }
                 }
@@ -359,6 +359,7 @@ impl Program {
             Output::Particles(message) => publishers.publish("particles", message),
             Output::Odometry(message) => publishers.publish("odom", *message),
             Output::Range(message) => publishers.publish("range", message),
+            Output::Velocity(message) => publishers.publish("velocity", message),
         }
     }
 
@@ -415,6 +416,11 @@ impl Program {
             let take = move |bytes| queue.send_blocking(Event::Bytes(bytes)).is_ok();
             self.link = Some(port::Link::open(text("port"), baud, take));
             return Ok(());
+        }
+        let (graph, publishers) = (&mut self.graph, &mut self.publishers);
+        let topic = text("search_motion_topic");
+        if !topic.is_empty() {
+            graph.publish::<Twist>(publishers, "velocity", &topic, Quality::Reliable)?;
         }
         self.listen_to_robot(&parameters)
     }

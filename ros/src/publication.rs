@@ -2,7 +2,7 @@
 
 use sonarfix_ros_messages::messages::{
     DiagnosticArray, MarkerArray, Odometry, ParticleCloud, PoseWithCovarianceStamped, Range,
-    TFMessage,
+    TFMessage, Twist,
 };
 
 /// A message of the node.
@@ -24,4 +24,6 @@ pub enum Output {
     Odometry(Box<Odometry>),
     /// To `~/range`, of a robot behind the link.
     Range(Range),
+    /// To `search_motion_topic`.
+    Velocity(Twist),
 }

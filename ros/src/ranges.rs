@@ -21,7 +21,8 @@ const MOST_WAITING: usize = 256;
 /// What a message measures.
 #[derive(Debug, Clone, PartialEq)]
 enum Content {
-    Range(RangerId, Option<f64>),
+    /// With whether it is nearer than the ranger can measure.
+    Range(RangerId, Option<f64>, bool),
     Scan(Box<LaserScan>),
 }
 
@@ -85,7 +86,7 @@ impl Ranges {
             return Err(Problem::RangeNotFinite);
         }
         let echo = within(range, min_range, max_range);
-        let content = Content::Range(ranger, echo);
+        let content = Content::Range(ranger, echo, range < min_range);
         self.add(&message.header.frame_id, message.header.stamp.nanoseconds(), content, now)
     }
 
@@ -139,7 +140,7 @@ impl Ranges {
         transforms: &Transforms,
         now: Nanoseconds,
     ) -> Result<Option<f64>, Problem> {
-        if let Content::Range(ranger, _) = waiting.content
+        if let Content::Range(ranger, ..) = waiting.content
             && let Some(&bearing) = self.bearings.get(ranger.index())
         {
             return Ok(Some(bearing));
@@ -158,8 +159,8 @@ impl Ranges {
     fn resolve(&self, waiting: &Waiting, offset: f64, due: &mut Due) {
         let at = waiting.at;
         let scan = match &waiting.content {
-            &Content::Range(ranger, range) => {
-                return due.beams.push(Beam { at, ranger, bearing: offset, range });
+            &Content::Range(ranger, range, is_near) => {
+                return due.beams.push(Beam { at, ranger, bearing: offset, range, is_near });
             }
             Content::Scan(scan) => scan,
         };
@@ -172,7 +173,7 @@ impl Ranges {
     }
 }
 
-/// A range within its limits; beyond them there was no echo (REP 117: infinite).
+/// A range within its limits; beyond them it is none (REP 117: infinite).
 fn within(range: f32, least: f32, most: f32) -> Option<f64> {
     (least <= range && range <= most).then(|| f64::from(range))
 }
@@ -204,6 +205,7 @@ fn beam_of(scan: &LaserScan, at: Nanoseconds, offset: f64, bearing: f64) -> Resu
         ranger: RangerId::FIRST,
         bearing: wrapped(offset + first + number * step),
         range: within(range, scan.range_min, scan.range_max),
+        is_near: range < scan.range_min,
     })
 }
 
@@ -233,6 +235,11 @@ mod tests {
         assert!((due.beams[0].bearing - 0.5).abs() < 1e-9);
         ranges.range(RangerId::FIRST, &heard(1000, f32::INFINITY), 1000).unwrap();
         assert_eq!(ranges.due(&tree, 3000).beams[0].range, None);
+        for (range, is_near) in [(f32::NEG_INFINITY, true), (0.09, true), (4.1, false)] {
+            ranges.range(RangerId::FIRST, &heard(1000, range), 1000).unwrap();
+            let due = ranges.due(&tree, 3000);
+            assert_eq!((due.beams[0].range, due.beams[0].is_near), (None, is_near), "{range}");
+        }
         let nan = ranges.range(RangerId::FIRST, &heard(1000, f32::NAN), 1000);
         assert_eq!(nan, Err(Problem::RangeNotFinite));
     }
@@ -258,7 +265,8 @@ mod tests {
             ..LaserScan::default()
         };
         let beam = beam_of(&scan, 0, 0.0, 0.0).unwrap();
-        assert_eq!((beam.range, beam.at), (None, 15_000_000));
+        assert_eq!((beam.range, beam.at, beam.is_near), (None, 15_000_000, false));
+        assert!(beam_of(&scan, 0, 0.0, -1.5).unwrap().is_near);
         let beam = beam_of(&scan, 0, 1.0, 0.32).unwrap();
         assert_eq!(beam.range, Some(8.0));
         assert!((beam.bearing - 0.3).abs() < 1e-6);

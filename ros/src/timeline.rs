@@ -37,6 +37,8 @@ pub struct Beam {
     pub bearing: f64,
     /// Metres; `None` without an echo.
     pub range: Option<f64>,
+    /// Whether there was an echo from nearer than the ranger can measure, which has no range.
+    pub is_near: bool,
 }
 
 impl Beam {
@@ -415,6 +417,6 @@ impl Clock {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the localizer computes in f32")]
-fn single(number: f64) -> f32 {
+pub(crate) fn single(number: f64) -> f32 {
     number as f32
 }

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
+from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -82,7 +83,8 @@ class Graph:
 
     def take(self, topic: str) -> list[Any]:
         """The messages of a reader since the last call."""
-        return [sample for sample in self.readers[topic].take(N=1000) if hasattr(sample, "__dataclass_fields__")]
+        # A writer that ends leaves a sample that is no message.
+        return [sample for sample in self.readers[topic].take(N=1000) if not isinstance(sample, InvalidSample)]
 
     def next(self, topic: str, what: Callable[[Any], bool] = lambda _: True, seconds: float = 10.0) -> Any:
         """The next message that fulfils a condition."""

@@ -30,6 +30,7 @@ MESSAGES = [
     "visualization_msgs/msg/MarkerArray",
     "nav2_msgs/msg/ParticleCloud",
     "bond/msg/Status",
+    "geometry_msgs/msg/Twist",
 ]
 
 
@@ -244,6 +245,30 @@ def test_a_lost_robot_searches_on_demand(graph: Graph, drive: Drive, start_node:
     node.set_pose(pose_at(*drive.true_pose(8 * SECOND)))
     graph.call("/request_nomotion_update", "std_srvs/msg/Empty")
     assert graph.next("/amcl_pose")
+
+
+@pytest.mark.parametrize("end", ["deactivate", "shutdown"])
+def test_a_robot_that_searches_moves_until_the_node_ends(
+    graph: Graph, drive: Drive, start_node: Callable[..., Node], end: str
+) -> None:
+    files = (f"robot_file:={drive.folder / 'turning.toml'}", "search_motion_topic:=cmd_vel")
+    node = start_node(parameters=(*SIMULATED, *files))
+    graph.reader("/cmd_vel", "geometry_msgs/msg/Twist")
+    player = Player(graph, drive)
+    node.bring_up()
+    for topic in ("/odom", "/range", "/tf", "/clock"):
+        graph.matched(topic)
+    turn, begin, step = 0.0, 0, SECOND // 5
+    while turn == 0.0:
+        assert begin < 20 * SECOND, "it stands"
+        player.play(begin, begin + step, speed=2.0)
+        begin += step
+        time.sleep(0.05)
+        turn = next((twist.angular.z for twist in reversed(graph.take("/cmd_vel"))), turn)
+    assert node.change(end)
+    assert graph.next("/cmd_vel") == make("geometry_msgs/msg/Twist")
+    player.play(begin, begin + SECOND)
+    assert graph.take("/cmd_vel") == []
 
 
 def test_a_robot_behind_the_link(graph: Graph, drive: Drive, start_node: Callable[..., Node], tmp_path: Path) -> None:
