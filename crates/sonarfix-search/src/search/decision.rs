@@ -10,15 +10,9 @@ use super::state::{Decision, Work};
 use super::trial::{Trial, count};
 use super::{Search, at_least_one, largest};
 
-/// Mean scores per ping at which the evidence counts not at all, and fully: where much of what is around is not in the map, pings
-/// that no wall explains come in groups.
-const UNTRUSTED: f32 = 0.4;
-const TRUSTED: f32 = 0.6;
-/// The odds that a robot needs which has not driven yet, as a share of those after that: its pings share no errors of position by the
-/// odometry. Chosen by `sonarfix-studies find-standing`, on seeds from 30000 (rooms) and 300000 (floor plans). Of 10,000 robots in furnished
-/// plans 1,820 are then right and 9 wrong, with the whole odds 964 and 3 (seeds from 8000000 and 8100000): what misleads them is furniture,
-/// seen from one place.
-const AT_REST: f32 = 2.0 / 3.0;
+/// An answer needs less than the whole odds where the map explains more than this share of the echoes, and half of them where it explains all:
+/// where much of what is around is not on the map, pings that no wall explains come in groups, and not every rival is among the hypotheses.
+const EXPLAINED: f32 = 0.8;
 /// So many global checks are made before an answer since the last rival, the last one with a clear lead.
 const CHECKS: u8 = 3;
 /// A global check is made at least once in so many cycles.
@@ -61,9 +55,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             self.is_check_due = true;
             return;
         };
-        let share = if self.window.is_at_rest() { AT_REST } else { 1.0 };
-        let odds = share * self.parameters.odds;
-        let least = best.evidence - 0.5 * odds;
+        let least = best.evidence - 0.5 * self.parameters.odds;
         let rivals = self.bank.entries().iter().filter(|entry| entry.evidence > least).count();
         let spread = &best.spread;
         let variance = largest(spread.xx, spread.xy, spread.yy);
@@ -71,7 +63,8 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         let (position, heading) = self.parameters.sharpness;
         let is_sharp =
             variance < position.0 * position.0 && spread.rotation < heading.0 * heading.0;
-        let is_clear = self.lead(&best) >= odds && is_sharp && self.has_separate_lines();
+        let is_clear =
+            self.lead(&best) >= self.odds(&best) && is_sharp && self.has_separate_lines();
         self.age(fresh);
         let was_unique = matches!(self.answer, Decision::Unique(_));
         self.checks = match rivals {
@@ -95,13 +88,17 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         };
     }
 
-    /// Logarithm of the odds of the best entry against the next, or a place without walls if that is more probable; less if
-    /// the pings hardly fit it.
+    /// Logarithm of the odds of the best entry against the next, or a place without walls if that is more probable.
     pub(super) fn lead(&self, best: &Entry) -> f32 {
         let second = self.bank.entries().get(1).map_or(0.0, |entry| entry.evidence);
-        let mean = best.score / at_least_one(best.pings);
-        let trust = at_most(at_least((mean - UNTRUSTED) / (TRUSTED - UNTRUSTED), 0.0), 1.0);
-        trust * (best.evidence - at_least(second, 0.0))
+        best.evidence - at_least(second, 0.0)
+    }
+
+    /// Logarithm of the odds that an answer needs.
+    fn odds(&self, best: &Entry) -> f32 {
+        let explained = f32::from(best.explained) / at_least_one(best.echoes);
+        let well = at_least(explained - EXPLAINED, 0.0) / (1.0 - EXPLAINED);
+        self.parameters.odds * (1.0 - 0.5 * well)
     }
 
     /// Counts what so many new pings have moved through the window as past.

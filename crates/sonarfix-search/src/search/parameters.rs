@@ -22,7 +22,7 @@ pub struct SearchParameters {
     /// What a ping returns besides the range of its wall.
     pub echo: EchoParameters,
     /// Logarithm of the odds by which a unique answer leads every other hypothesis and a place without walls. Pings near each other share
-    /// the errors of map and odometry, so that it is far above that of odds of 1,000 to 1, 6.9.
+    /// the errors of map and odometry, so that it is far above that of odds of 1,000 to 1, 6.9. Half of it where the map explains every echo.
     pub odds: f32,
     /// Largest deviations of position and heading of a unique answer.
     pub sharpness: (Metres, Radians),

@@ -111,13 +111,16 @@ prop_compose! {
     fn entry()(
         (x, y, angle) in (0.5_f32..5.5, 0.5_f32..3.5, -3.1_f32..3.1), score in 0.0_f32..1.5,
         pings in 12_u8..96, silent in 0_u8..6, spread in spread(),
-        past in 0.0_f32..30.0, evidence in -10.0_f32..120.0,
+        past in 0.0_f32..30.0, evidence in -10.0_f32..120.0, explained in 0.4_f32..1.0,
     ) -> Entry {
         let placement = Placement {
             at: Vector::new(x, y), rotation: Vector::of_angle(angle), bend: Bend::default(),
         };
+        let echoes = pings - silent;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 96")]
+        let explained = (explained * f32::from(echoes)) as u8;
         Entry {
-            placement, score: score * f32::from(pings), pings, echoes: pings - silent, explained: pings / 2,
+            placement, score: score * f32::from(pings), pings, echoes, explained,
             spread, past, evidence, state: State::Fresh,
         }
     }
@@ -137,7 +140,7 @@ proptest! {
         best in entry(), leads in prop::collection::vec(0.0_f32..60.0, 0..3), other in entry(),
         fresh in prop_oneof![0_u16..10, 0_u16..40], taken in 0_u16..500, cycles in 0_u32..50, are_separate in any::<bool>(),
         (is_checked, was_unique, checks) in (any::<bool>(), any::<bool>(), 0_u8..5),
-        (is_sharp_entry, is_at_rest) in (any::<bool>(), any::<bool>()),
+        is_sharp_entry in any::<bool>(),
     ) {
         let walls = room();
         let mut search = search(&walls);
@@ -162,11 +165,11 @@ proptest! {
         let before = if was_unique { Decision::Unique(best) } else { Decision::Several(3) };
         search.answer = before;
         search.work = Work::None;
-        search.window.drive(if is_at_rest { 0.19 } else { 0.21 }, 0.0);
 
         let parameters = search.parameters;
-        // A robot that has not driven needs two thirds of the odds.
-        let odds = f64::from(parameters.odds) * if is_at_rest { 2.0 / 3.0 } else { 1.0 };
+        let explained = f64::from(best.explained) / f64::from(best.echoes.max(1));
+        // 24, less from 80 % on, 12 where the map explains every echo.
+        let (least, odds) = (12.0, 12.0 + (60.0 * (1.0 - explained)).min(12.0));
         let evidence: Vec<f64> = bank.iter().map(|entry| f64::from(entry.evidence)).collect();
         let (variance, axis) = largest_of(&best.spread);
         let sharpness = (
@@ -174,13 +177,11 @@ proptest! {
         );
         let rotation = f64::from(best.spread.rotation);
         let rival = evidence.get(1).copied().unwrap_or(0.0).max(0.0);
-        // From 0.4 to 0.6 a ping the evidence counts more and more.
-        let trust = ((f64::from(best.score) / f64::from(best.pings) - 0.4) / 0.2).clamp(0.0, 1.0);
-        let lead = trust * (evidence[0] - rival);
-        prop_assume!(evidence.iter().skip(1).all(|other| is_clear(evidence[0] - other, 0.5 * odds)));
+        let lead = evidence[0] - rival;
+        prop_assume!(evidence.iter().skip(1).all(|other| is_clear(evidence[0] - other, least)));
         prop_assume!(is_clear(lead, odds) && is_clear(evidence[0], 0.0) && is_clear(variance, 0.09));
         prop_assume!(is_clear(variance / sharpness.0, 1.0) && is_clear(rotation / sharpness.1, 1.0));
-        let rivals = evidence.iter().filter(|other| evidence[0] - **other < 0.5 * odds).count();
+        let rivals = evidence.iter().filter(|other| evidence[0] - **other < least).count();
         let is_anywhere = evidence[0] > 0.0;
         let is_determined = variance < 0.09;
         let is_sharp = variance < sharpness.0 && rotation < sharpness.1;

@@ -155,11 +155,6 @@ impl<const PINGS: usize> Window<PINGS> {
         self.path.since_start
     }
 
-    /// Whether the robot has not left the place where the search began.
-    pub fn is_at_rest(&self) -> bool {
-        self.path.since_start < NOVEL_DISTANCE
-    }
-
     /// What is taken out of the odometry.
     pub fn bend(&self) -> Bend {
         self.path.bend
