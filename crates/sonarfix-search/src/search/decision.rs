@@ -10,8 +10,12 @@ use super::state::{Decision, Work};
 use super::trial::{Trial, count};
 use super::{Search, at_least_one, largest};
 
+/// Mean scores per ping at which the evidence counts not at all, and fully: where much of what is around is not in the map, pings
+/// that no wall explains come in groups.
+const UNTRUSTED: f32 = 0.4;
+const TRUSTED: f32 = 0.6;
 /// An answer needs less than the whole odds where the map explains more than this share of the echoes, and half of them where it explains all:
-/// where much of what is around is not on the map, pings that no wall explains come in groups, and not every rival is among the hypotheses.
+/// what misleads a search is furniture.
 const EXPLAINED: f32 = 0.8;
 /// So many global checks are made before an answer since the last rival, the last one with a clear lead.
 const CHECKS: u8 = 3;
@@ -88,10 +92,13 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         };
     }
 
-    /// Logarithm of the odds of the best entry against the next, or a place without walls if that is more probable.
+    /// Logarithm of the odds of the best entry against the next, or a place without walls if that is more probable; less if
+    /// the pings hardly fit it.
     pub(super) fn lead(&self, best: &Entry) -> f32 {
         let second = self.bank.entries().get(1).map_or(0.0, |entry| entry.evidence);
-        best.evidence - at_least(second, 0.0)
+        let mean = best.score / at_least_one(best.pings);
+        let trust = at_most(at_least((mean - UNTRUSTED) / (TRUSTED - UNTRUSTED), 0.0), 1.0);
+        trust * (best.evidence - at_least(second, 0.0))
     }
 
     /// Logarithm of the odds that an answer needs.

@@ -177,7 +177,9 @@ proptest! {
         );
         let rotation = f64::from(best.spread.rotation);
         let rival = evidence.get(1).copied().unwrap_or(0.0).max(0.0);
-        let lead = evidence[0] - rival;
+        // From 0.4 to 0.6 a ping the evidence counts more and more.
+        let trust = ((f64::from(best.score) / f64::from(best.pings) - 0.4) / 0.2).clamp(0.0, 1.0);
+        let lead = trust * (evidence[0] - rival);
         prop_assume!(evidence.iter().skip(1).all(|other| is_clear(evidence[0] - other, least)));
         prop_assume!(is_clear(lead, odds) && is_clear(evidence[0], 0.0) && is_clear(variance, 0.09));
         prop_assume!(is_clear(variance / sharpness.0, 1.0) && is_clear(rotation / sharpness.1, 1.0));
