@@ -535,7 +535,7 @@ impl Node {
                 outcomes.add(heard);
             }
             let (Some(range), Some(sonar)) =
-                (heard.beam.range, self.config.localizer.rangers.get(ranger))
+                (heard.beam.echo.range(), self.config.localizer.rangers.get(ranger))
             else {
                 continue;
             };

@@ -7,7 +7,7 @@ use sonarfix_ros_messages::messages::{LaserScan, RangeHeard};
 
 use crate::motion::wrapped;
 use crate::problem::{Nanoseconds, Problem};
-use crate::timeline::Beam;
+use crate::timeline::{Beam, Echo};
 use sonarfix_ros_messages::transforms::{NoTransform, Transforms};
 
 /// How long a range waits for a transform at its time, and how old that may be then.
@@ -21,8 +21,7 @@ const MOST_WAITING: usize = 256;
 /// What a message measures.
 #[derive(Debug, Clone, PartialEq)]
 enum Content {
-    /// With whether it is nearer than the ranger can measure.
-    Range(RangerId, Option<f64>, bool),
+    Range(RangerId, Echo),
     Scan(Box<LaserScan>),
 }
 
@@ -85,8 +84,7 @@ impl Ranges {
         if range.is_nan() || min_range.is_nan() || max_range.is_nan() {
             return Err(Problem::RangeNotFinite);
         }
-        let echo = within(range, min_range, max_range);
-        let content = Content::Range(ranger, echo, range < min_range);
+        let content = Content::Range(ranger, echo(range, min_range, max_range));
         self.add(&message.header.frame_id, message.header.stamp.nanoseconds(), content, now)
     }
 
@@ -140,7 +138,7 @@ impl Ranges {
         transforms: &Transforms,
         now: Nanoseconds,
     ) -> Result<Option<f64>, Problem> {
-        if let Content::Range(ranger, ..) = waiting.content
+        if let Content::Range(ranger, _) = waiting.content
             && let Some(&bearing) = self.bearings.get(ranger.index())
         {
             return Ok(Some(bearing));
@@ -159,8 +157,8 @@ impl Ranges {
     fn resolve(&self, waiting: &Waiting, offset: f64, due: &mut Due) {
         let at = waiting.at;
         let scan = match &waiting.content {
-            &Content::Range(ranger, range, is_near) => {
-                return due.beams.push(Beam { at, ranger, bearing: offset, range, is_near });
+            &Content::Range(ranger, echo) => {
+                return due.beams.push(Beam { at, ranger, bearing: offset, echo });
             }
             Content::Scan(scan) => scan,
         };
@@ -173,9 +171,15 @@ impl Ranges {
     }
 }
 
-/// A range within its limits; beyond them it is none (REP 117: infinite).
-fn within(range: f32, least: f32, most: f32) -> Option<f64> {
-    (least <= range && range <= most).then(|| f64::from(range))
+/// The echo of a range that is not NaN, by the limits of its message (REP 117: minus infinity is too near, infinity is no echo).
+fn echo(range: f32, least: f32, most: f32) -> Echo {
+    if range < least {
+        Echo::TooNear
+    } else if range <= most {
+        Echo::At(range.into())
+    } else {
+        Echo::None
+    }
 }
 
 /// The beam of a scan that is nearest to a bearing.
@@ -204,8 +208,7 @@ fn beam_of(scan: &LaserScan, at: Nanoseconds, offset: f64, bearing: f64) -> Resu
         at: at.saturating_add(later),
         ranger: RangerId::FIRST,
         bearing: wrapped(offset + first + number * step),
-        range: within(range, scan.range_min, scan.range_max),
-        is_near: range < scan.range_min,
+        echo: echo(range, scan.range_min, scan.range_max),
     })
 }
 
@@ -231,14 +234,15 @@ mod tests {
         transform.transform.rotation = sonarfix_ros_messages::geometry::quaternion(0.5);
         assert!(tree.take(&transform, true));
         let due = ranges.due(&tree, 3000);
-        assert_eq!((due.beams.len(), due.beams[0].range), (1, Some(1.5)));
+        assert_eq!((due.beams.len(), due.beams[0].echo), (1, Echo::At(1.5)));
         assert!((due.beams[0].bearing - 0.5).abs() < 1e-9);
         ranges.range(RangerId::FIRST, &heard(1000, f32::INFINITY), 1000).unwrap();
-        assert_eq!(ranges.due(&tree, 3000).beams[0].range, None);
-        for (range, is_near) in [(f32::NEG_INFINITY, true), (0.09, true), (4.1, false)] {
+        assert_eq!(ranges.due(&tree, 3000).beams[0].echo, Echo::None);
+        let limits = [(f32::NEG_INFINITY, Echo::TooNear), (0.09, Echo::TooNear), (4.1, Echo::None)];
+        for (range, expected) in limits {
             ranges.range(RangerId::FIRST, &heard(1000, range), 1000).unwrap();
             let due = ranges.due(&tree, 3000);
-            assert_eq!((due.beams[0].range, due.beams[0].is_near), (None, is_near), "{range}");
+            assert_eq!(due.beams[0].echo, expected, "{range}");
         }
         let nan = ranges.range(RangerId::FIRST, &heard(1000, f32::NAN), 1000);
         assert_eq!(nan, Err(Problem::RangeNotFinite));
@@ -265,10 +269,10 @@ mod tests {
             ..LaserScan::default()
         };
         let beam = beam_of(&scan, 0, 0.0, 0.0).unwrap();
-        assert_eq!((beam.range, beam.at, beam.is_near), (None, 15_000_000, false));
-        assert!(beam_of(&scan, 0, 0.0, -1.5).unwrap().is_near);
+        assert_eq!((beam.echo, beam.at), (Echo::None, 15_000_000));
+        assert_eq!(beam_of(&scan, 0, 0.0, -1.5).unwrap().echo, Echo::TooNear);
         let beam = beam_of(&scan, 0, 1.0, 0.32).unwrap();
-        assert_eq!(beam.range, Some(8.0));
+        assert_eq!(beam.echo, Echo::At(8.0));
         assert!((beam.bearing - 0.3).abs() < 1e-6);
         assert_eq!(beam_of(&scan, 0, 0.0, 2.0), Err(Problem::ScanAngles));
         assert_eq!(beam_of(&scan, 0, 0.0, -2.0), Err(Problem::ScanAngles));

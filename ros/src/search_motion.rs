@@ -19,7 +19,7 @@ use sonarfix_ros_messages::messages::{Twist, Vector3};
 use crate::motion::Part;
 use crate::parameters::Parameters;
 use crate::problem::Nanoseconds;
-use crate::timeline::{Beam, Heard, single};
+use crate::timeline::{Beam, Echo, Heard, single};
 
 /// Time without a ping after which the robot stands, and begins anew with the next one.
 const SILENCE: Nanoseconds = 1_000_000_000;
@@ -36,9 +36,13 @@ enum Event {
 
 impl Event {
     fn of(beam: &Beam) -> Self {
-        // Nearer than the ranger can measure is an object at the ranger.
-        let range = if beam.is_near { Some(0.0) } else { beam.range };
-        Self::Ping(Radians(single(beam.bearing)), range.map(|range| Metres(single(range))))
+        let range = match beam.echo {
+            Echo::None => None,
+            // An object at the ranger.
+            Echo::TooNear => Some(Metres(0.0)),
+            Echo::At(range) => Some(Metres(single(range))),
+        };
+        Self::Ping(Radians(single(beam.bearing)), range)
     }
 
     fn apply(&self, mover: &mut SearchMover, track_width: Metres) {
@@ -278,7 +282,8 @@ mod tests {
 
         fn beam(&self, degrees: f64, range: Option<f64>) -> Beam {
             let bearing = f64::to_radians(degrees);
-            Beam { at: self.now, ranger: RangerId::FIRST, bearing, range, is_near: false }
+            let echo = range.map_or(Echo::None, Echo::At);
+            Beam { at: self.now, ranger: RangerId::FIRST, bearing, echo }
         }
 
         fn hear(&mut self, beam: Beam) {
@@ -358,7 +363,7 @@ mod tests {
         let mut robot = Robot::driving();
         robot.hear(Beam { ranger: RangerId(1), ..robot.beam(0.0, Some(0.1)) });
         assert_eq!(robot.due(), None);
-        robot.hear(Beam { is_near: true, ..robot.beam(0.0, None) });
+        robot.hear(Beam { echo: Echo::TooNear, ..robot.beam(0.0, None) });
         assert!(robot.due().is_some_and(|[ahead, _]| ahead == 0.0));
     }
 

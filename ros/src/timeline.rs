@@ -26,6 +26,28 @@ const MOST_AHEAD: Nanoseconds = 100_000_000;
 /// The localizer's time of the first odometry, microseconds: later than zero, so that a step that ends a little earlier exists.
 const FIRST: u64 = 1_000_000;
 
+/// The result of a ping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Echo {
+    /// No echo, or one from beyond the longest range.
+    None,
+    /// An echo from nearer than the ranger can measure: it has no range.
+    TooNear,
+    /// The range, metres.
+    At(f64),
+}
+
+impl Echo {
+    /// The range, metres, if there is one.
+    #[must_use]
+    pub fn range(self) -> Option<f64> {
+        match self {
+            Self::None | Self::TooNear => None,
+            Self::At(range) => Some(range),
+        }
+    }
+}
+
 /// A range along a bearing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
@@ -35,10 +57,8 @@ pub struct Beam {
     pub ranger: RangerId,
     /// Radians counter-clockwise from the heading.
     pub bearing: f64,
-    /// Metres; `None` without an echo.
-    pub range: Option<f64>,
-    /// Whether there was an echo from nearer than the ranger can measure, which has no range.
-    pub is_near: bool,
+    /// The result.
+    pub echo: Echo,
 }
 
 impl Beam {
@@ -399,7 +419,7 @@ impl Clock {
         beam: Beam,
     ) -> Heard {
         let (bearing, range) =
-            (Radians(single(beam.bearing)), beam.range.map(|it| Metres(single(it))));
+            (Radians(single(beam.bearing)), beam.echo.range().map(|it| Metres(single(it))));
         if navigator.mode() == Mode::Searching {
             if let Some(search) = search.filter(|_| beam.ranger == RangerId::FIRST) {
                 // What is not finite was refused before.

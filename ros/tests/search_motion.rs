@@ -1,4 +1,4 @@
-//! A robot that searches moves as the node requests it: a base that obeys the velocities, in a world of walls, whose odometry and
+//! A robot that searches moves as the node requests it: a base that drives with the velocities, in a world of walls, whose odometry and
 //! ranges go back to the node.
 
 #![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
@@ -160,7 +160,7 @@ impl Robot {
         }
     }
 
-    fn obey(&mut self, out: &[Output]) {
+    fn follow(&mut self, out: &[Output]) {
         for command in velocities(out) {
             self.received.push(command);
             (self.command, self.commanded) = (command, self.now);
@@ -217,7 +217,7 @@ impl Robot {
         self.underway.push((self.now + delay, input));
     }
 
-    /// Lives for a step, and exchanges messages with the node.
+    /// Drives for a step, and exchanges messages with the node.
     fn step(&mut self, node: &mut impl Takes) {
         self.roll();
         if self.now % ODOMETRY_PERIOD == 0 {
@@ -233,7 +233,7 @@ impl Robot {
         let due: Vec<(Nanoseconds, Input)> = due;
         for (_, input) in due.into_iter().chain([(self.now, Input::Tick)]) {
             let out = node.take(input, self.now);
-            self.obey(&out);
+            self.follow(&out);
         }
     }
 
@@ -284,12 +284,6 @@ fn the_robot_finds_its_pose_and_touches_no_wall() {
             robot.step(&mut node);
         }
         let [x, y, heading] = between(robot.pose, node.view().unwrap().pose);
-        println!(
-            "{start:?}: {} s, {} m, {} m",
-            seconds(robot.now - BEGIN),
-            robot.driven,
-            robot.nearest
-        );
         assert!(x.hypot(y) < 0.06 && heading.abs() < 0.06, "{start:?}: {x} {y} {heading}");
         assert!(robot.driven > 0.2 && robot.nearest > RADIUS, "{start:?}: {}", robot.nearest);
         let stops = robot.take_received();

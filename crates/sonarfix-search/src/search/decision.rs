@@ -15,7 +15,7 @@ use super::{Search, at_least_one, largest};
 const UNTRUSTED: f32 = 0.4;
 const TRUSTED: f32 = 0.6;
 /// An answer needs less than the whole odds where the map explains more than this share of the echoes, and half of them where it explains all:
-/// what misleads a search is furniture.
+/// what misleads a search is furniture. Chosen as `docs/search.md` states.
 const EXPLAINED: f32 = 0.8;
 /// So many global checks are made before an answer since the last rival, the last one with a clear lead.
 const CHECKS: u8 = 3;
