@@ -1,6 +1,8 @@
 //! Robots that move by themselves while they search for their pose, in floor plans: the shipped application drives, by its
 //! configuration and its sonar alone, from the place where it is switched on.
 
+use std::collections::VecDeque;
+
 use serde::Serialize;
 use sonarfix::geometry::units::Metres;
 use sonarfix::localizer::{Localizer, Mode};
@@ -17,6 +19,9 @@ use crate::search_study::Plans;
 
 /// Time between two records of the pose, µs.
 const STEP: u64 = 20_000;
+/// So many of them are compared with an answer, which is of the last sample of the encoders, at most 100 ms ago: a robot that turns is
+/// elsewhere since then.
+const RECENT: usize = 6;
 
 /// The outcome of one trial, which ends with the first pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -71,7 +76,7 @@ pub fn trial(
     robot.start(None)?;
     let mut trial =
         Trial { seed, found_after: None, is_right: false, metres: 0.0, nearest: f64::INFINITY };
-    let mut time = 0;
+    let (mut time, mut recent) = (0, VecDeque::new());
     #[expect(clippy::cast_precision_loss, reason = "some minutes in µs")]
     let since = |time: u64| time as f64 * 1e-6;
     while since(time) < seconds && trial.found_after.is_none() {
@@ -79,6 +84,8 @@ pub fn trial(
         time += STEP;
         robot.run_to(time);
         let pose = robot.pose();
+        recent.push_front(pose);
+        recent.truncate(RECENT);
         trial.metres += (pose.x - from.x).hypot(pose.y - from.y);
         let distances = obstacles.iter().map(|(segment, radius)| {
             distance([pose.x, pose.y], segment.nearest([pose.x, pose.y])) - radius
@@ -86,7 +93,9 @@ pub fn trial(
         trial.nearest = distances.fold(trial.nearest, f64::min);
         if robot.mode().is_some_and(|mode| mode != Mode::Searching) {
             trial.found_after = Some(since(time));
-            trial.is_right = robot.localizer().is_some_and(|found| is_right(found, &pose));
+            trial.is_right = robot
+                .localizer()
+                .is_some_and(|found| recent.iter().any(|pose| is_right(found, pose)));
         }
     }
     Ok(trial)

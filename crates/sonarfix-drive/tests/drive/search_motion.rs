@@ -147,18 +147,36 @@ fn in_a_square() -> World {
     World::new(walls, [2.0, 2.0], 0.0)
 }
 
-/// It stands until a sweep is complete, and ends at the bumper distance before the wall.
+/// It stands until it has looked 30° to 45° to both sides, and ends at the bumper distance before the wall.
 #[test]
-fn it_sweeps_before_it_drives_and_stops_at_the_bumper_distance() {
+fn it_looks_ahead_before_it_drives_and_stops_at_the_bumper_distance() {
     let mut world = in_a_square();
     let mut mover = mover(SearchMotionKind::Ahead);
-    let mut pings = 0;
+    let mut looked = vec![world.bearing];
     while world.step(&mut mover).speed.0 == 0.0 {
-        pings += 1;
+        looked.push(world.bearing);
     }
-    assert!((17..40).contains(&pings), "{pings}");
+    let (last, before) = looked.split_last().unwrap();
+    assert!(*last > 30_f64.to_radians(), "{looked:?}");
+    assert!(before.iter().all(|bearing| *bearing < 30_f64.to_radians()), "{looked:?}");
     while world.step(&mut mover).speed.0 > 0.0 {}
     assert!((4.0 - world.at[0] - BUMPER).abs() < 0.02, "{:?}", world.at);
+}
+
+/// Before a wall that it meets at an angle: on along the wall, not back across it.
+#[test]
+fn it_turns_to_where_the_most_is_free() {
+    for side in [1.0, -1.0] {
+        let mut world = World { heading: 0.7 * side, ..in_a_square() };
+        let mut mover = mover(SearchMotionKind::Ahead);
+        while world.step(&mut mover).speed.0 == 0.0 {}
+        while world.step(&mut mover).speed.0 > 0.0 {}
+        let (before, from) = (world.heading, world.driven);
+        while world.step(&mut mover).speed.0 == 0.0 {}
+        assert!(side * (world.heading - before) > 0.3, "{}", world.heading);
+        while world.step(&mut mover).speed.0 > 0.0 {}
+        assert!(world.driven - from > 0.2, "{} m", world.driven - from);
+    }
 }
 
 /// A dead sonar: it stands after 5 cm.
