@@ -8,8 +8,10 @@ use sonarfix::map::WallId;
 use super::bank::{Entry, State};
 use super::state::{Decision, Work};
 use super::trial::{Trial, count};
-use super::{Search, largest};
+use super::{Search, at_least_one, largest};
 
+/// So much more of the odds an answer needs if the map explained no echo: what misleads a search is furniture.
+const UNEXPLAINED: f32 = 1.25;
 /// Hypotheses are rivals whose odds against the best one are less than this share of those of an answer.
 const RIVAL: f32 = 0.6;
 /// So many global checks are made before an answer since the last rival, the last one with a clear lead.
@@ -53,7 +55,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         let is_sharp =
             variance < position.0 * position.0 && spread.rotation < heading.0 * heading.0;
         let is_clear =
-            self.lead(&best) >= self.parameters.odds && is_sharp && self.has_separate_lines();
+            self.lead(&best) >= self.odds(&best) && is_sharp && self.has_separate_lines();
         self.age(fresh);
         let was_unique = matches!(self.answer, Decision::Unique(_));
         self.checks = match rivals {
@@ -81,6 +83,12 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
     fn lead(&self, best: &Entry) -> f32 {
         let second = self.bank.entries().get(1).map_or(0.0, |entry| entry.evidence);
         best.evidence - at_least(second, 0.0)
+    }
+
+    /// Logarithm of the odds that an answer needs.
+    fn odds(&self, best: &Entry) -> f32 {
+        let explained = f32::from(best.explained) / at_least_one(best.echoes);
+        self.parameters.odds * (1.0 + UNEXPLAINED * (1.0 - explained))
     }
 
     /// Counts what so many new pings have moved through the window as past.

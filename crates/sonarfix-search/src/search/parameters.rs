@@ -23,6 +23,7 @@ pub struct SearchParameters {
     pub echo: EchoParameters,
     /// Logarithm of the odds by which a unique answer leads every other hypothesis and a place without walls. Pings near each other share
     /// the errors of map and odometry, so that it is above that of odds of 1,000 to 1, 6.9.
+    /// That many where the map explains every echo.
     pub odds: f32,
     /// Largest deviations of position and heading of a unique answer.
     pub sharpness: (Metres, Radians),

@@ -167,7 +167,8 @@ proptest! {
         search.work = Work::None;
 
         let parameters = search.parameters;
-        let (least, odds) = (7.2, 12.0);
+        let explained = f64::from(best.explained) / f64::from(best.echoes.max(1));
+        let (least, odds) = (7.2, 12.0 + 15.0 * (1.0 - explained));
         let evidence: Vec<f64> = bank.iter().map(|entry| f64::from(entry.evidence)).collect();
         let (variance, axis) = largest_of(&best.spread);
         let sharpness = (
