@@ -22,8 +22,7 @@ pub struct SearchParameters {
     /// What a ping returns besides the range of its wall.
     pub echo: EchoParameters,
     /// Logarithm of the odds by which a unique answer leads every other hypothesis and a place without walls. Pings near each other share
-    /// the errors of map and odometry, so that it is above that of odds of 1,000 to 1, 6.9.
-    /// That many where the map explains every echo.
+    /// the errors of map and odometry, so that it is far above that of odds of 1,000 to 1, 6.9. Half of it where the map explains every echo.
     pub odds: f32,
     /// Largest deviations of position and heading of a unique answer.
     pub sharpness: (Metres, Radians),
@@ -38,7 +37,7 @@ impl Default for SearchParameters {
             turn_scale: 0.02,
             odometry: 0.015,
             echo: EchoParameters::HC_SR04,
-            odds: 12.0,
+            odds: 24.0,
             sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
     }

@@ -19,12 +19,6 @@ use sonarfix::geometry::vector::Vector;
 
 /// A ping is novel if no ping of the window was sent from within this distance, metres, in the same direction.
 const NOVEL_DISTANCE: f32 = 0.2;
-/// Echoes from within this distance, metres, of each other are of one place.
-const SAME_ECHO: f32 = 0.2;
-/// An echo is compared with those of so many pings before it: two or three sweeps.
-const COMPARED: usize = 32;
-/// The bits of a range that count its repeats: 63 at most, and an error of the range by less than 1 in 100,000.
-const REPEATS: u32 = 63;
 
 /// How the heading by odometry departs from the true one: by wheels of unequal size, and by an error
 /// of the track width.
@@ -78,28 +72,13 @@ pub(super) struct Ping {
     pub station: Station,
     /// Unit vector along the beam.
     pub axis: Vector,
-    /// The bits of the range in metres, negative without an echo; the last ones, [`REPEATS`], count the echoes of the same place before.
-    echo: u32,
+    /// Metres; negative: no echo.
+    range: f32,
 }
 
 impl Ping {
-    /// Metres; `None` without an echo.
     pub fn range(&self) -> Option<f32> {
-        let range = f32::from_bits(self.echo & !REPEATS);
-        (range >= 0.0).then_some(range)
-    }
-
-    /// The point on the axis at the range.
-    #[inline(never)]
-    pub fn point(&self) -> Option<Vector> {
-        Some(self.station.at.plus(self.axis.times(self.range()?)))
-    }
-
-    /// How much the ping tells: of echoes of one place the first tells all, the others 1/2, 1/3, and so on.
-    pub fn weight(&self) -> f32 {
-        #[expect(clippy::cast_precision_loss, reason = "at most 63")]
-        let repeats = (self.echo & REPEATS) as f32;
-        1.0 / (1.0 + repeats)
+        (self.range >= 0.0).then_some(self.range)
     }
 }
 
@@ -227,19 +206,7 @@ impl<const PINGS: usize> Window<PINGS> {
         }
         // There is room now, unless there is room for none.
         self.path.taken = self.path.taken.wrapping_add(1);
-        let mut ping = Ping { station, axis, echo: range.unwrap_or(-1.0).to_bits() & !REPEATS };
-        ping.echo |= self.repeats(&ping);
-        self.pings.push(ping).is_ok()
-    }
-
-    /// How many echoes of the pings before are of the place of this one.
-    fn repeats(&self, ping: &Ping) -> u32 {
-        let Some(point) = ping.point() else { return 0 };
-        let others = self.pings.iter().rev().take(COMPARED).filter_map(Ping::point);
-        others.fold(0, |repeats, other| {
-            let is_same = other.minus(point).length_squared() < SAME_ECHO * SAME_ECHO;
-            repeats + u32::from(is_same)
-        })
+        self.pings.push(Ping { station, axis, range: range.unwrap_or(-1.0) }).is_ok()
     }
 
     /// Makes the robot's present place the reference and returns it in the old frame.

@@ -102,11 +102,7 @@ impl Sent {
             && is_near(wide(ping.axis), turned(Wide::x(), self.direction))
             && (f64::from(ping.station.travelled) - self.robot.travelled).abs() < 1e-4
             && (f64::from(ping.station.turned) - self.robot.turned).abs() < 1e-4
-            && match (ping.range(), self.range) {
-                (None, None) => true,
-                (Some(is), Some(range)) => (is - range).abs() < 1e-4,
-                _ => false,
-            }
+            && ping.range() == self.range
     }
 }
 
@@ -166,51 +162,6 @@ proptest! {
         prop_assert_eq!(*window.robot(), Station::default());
         prop_assert_eq!((window.start(), window.since_start(), window.heading()), (Vector::default(), 0.0, 0.0));
         prop_assert_eq!((window.bend(), window.count(), window.taken()), (Bend::NONE, 0, 0));
-    }
-
-    /// The n-th echo of a place among the last 33 pings has the weight 1/n, and a ping without an echo the whole.
-    #[test]
-    fn of_the_echoes_of_one_place_the_first_tells_most(
-        steps in prop::collection::vec((step(), any::<bool>()), 10..70), mount in mount(),
-    ) {
-        let mut window: Window<48> = Window::new(mount);
-        let (mut robot, mut ends): (_, Vec<Option<Wide>>) = (Robot::default(), Vec::new());
-        let mut repeated = 0;
-        for (mut step, is_near) in steps {
-            if is_near {
-                // Echoes of a few places.
-                (step.advance, step.turn) = (0.1 * step.advance, 0.1 * step.turn);
-                step.range = step.range.map(|range| 0.2 * range);
-            }
-            window.drive(step.advance, step.turn);
-            robot.drive(&step, Bend::NONE);
-            window.rebase();
-            robot = robot.seen_from(&robot);
-            // Independent of the frame's origin: the places are kept relative to the robot.
-            let moved = turned(Wide::new(step.advance.into(), 0.0), robot.heading - 0.5 * f64::from(step.turn));
-            for end in ends.iter_mut().flatten() {
-                *end -= moved;
-            }
-            let direction = robot.heading + f64::from(step.bearing);
-            let end = step.range.map(|range| robot.sonar(mount) + turned(Wide::new(range.into(), 0.0), direction));
-            if !window.ping(step.bearing, step.range, ALL) {
-                continue;
-            }
-            let mut repeats = 0;
-            if let Some(end) = end {
-                for other in ends.iter().rev().take(32).flatten() {
-                    let distance = (end - other).norm() - 0.2;
-                    prop_assume!(distance.abs() > 3e-3);
-                    repeats += i32::from(distance < 0.0);
-                }
-            }
-            ends.push(end);
-            repeated += repeats;
-            window.rebase();
-            let weight = f64::from(window.newest(0).unwrap().weight());
-            prop_assert!((weight * f64::from(1 + repeats) - 1.0).abs() < 1e-6, "{weight} {repeats}");
-        }
-        prop_assume!(repeated > 0);
     }
 
     /// A ping is taken if no other of the window was sent from within 30 cm in its direction; the oldest drops out.
