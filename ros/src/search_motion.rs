@@ -230,6 +230,8 @@ mod tests {
     const HISTORY: Nanoseconds = 1_000_000_000;
     const TIMEOUT: Nanoseconds = 500_000_000;
     const PERIOD: Nanoseconds = 50_000_000;
+    /// The motion ahead.
+    const AHEAD: [f64; 2] = [0.25, 0.0];
 
     fn config(kind: Option<SearchMotionKind>) -> RobotConfig {
         let mut config = RobotConfig::with_common_parts(Config::for_track_width(Metres(0.16)));
@@ -261,11 +263,11 @@ mod tests {
         /// Its sweep has found free floor.
         fn driving() -> Self {
             let mut robot = Self::new(SearchMotionKind::Ahead);
-            for degrees in [-60.0, 0.0, 60.0, 0.0, -60.0, 0.0] {
-                robot.ping(degrees, Some(2.0));
+            for step in -6_i8..=6 {
+                robot.ping(f64::from(10 * step), Some(2.0));
                 robot.travel(0.0);
             }
-            assert_eq!(robot.due(), Some([0.15, 0.0]));
+            assert_eq!(robot.due(), Some(AHEAD));
             robot
         }
 
@@ -320,7 +322,7 @@ mod tests {
         usual.hear(beam);
         for robot in [&mut usual, &mut late] {
             robot.travel(0.015);
-            assert_eq!(robot.due(), Some([0.15, 0.0]));
+            assert_eq!(robot.due(), Some(AHEAD));
             robot.travel(0.015);
         }
         late.hear(beam);
@@ -336,7 +338,7 @@ mod tests {
         for step in 0..1000 {
             robot.ping([-60.0, 0.0, 60.0, 0.0][step % 4], Some(2.0));
             robot.travel(0.0);
-            assert_eq!(robot.due(), Some([0.15, 0.0]));
+            assert_eq!(robot.due(), Some(AHEAD));
         }
         let kept = |robot: &Robot| robot.requests.course.as_ref().unwrap().kept.len();
         assert!((40..45).contains(&kept(&robot)), "{}", kept(&robot));
@@ -352,7 +354,7 @@ mod tests {
         robot.ping(10.0, Some(2.0));
         assert_eq!(robot.due(), None);
         robot.travel(0.001);
-        assert_eq!(robot.due(), Some([0.15, 0.0]));
+        assert_eq!(robot.due(), Some(AHEAD));
         robot.ping(20.0, Some(0.1));
         assert!(robot.due().is_some_and(|[ahead, _]| ahead == 0.0));
     }
