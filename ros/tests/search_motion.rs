@@ -422,8 +422,7 @@ fn a_node_that_is_deactivated_stops_the_robot() {
     assert_eq!(robot.take_received(), Vec::<[f64; 2]>::new());
     for end in [Transition::Deactivate, Transition::Shutdown] {
         assert!(managed.change(Transition::Activate, robot.now));
-        // A quarter of the full turn.
-        robot.run(&mut managed, SECOND);
+        robot.run(&mut managed, 2 * SECOND);
         assert!(robot.take_received().last().is_some_and(|[_, turn]| *turn > 0.0));
         assert!(managed.change(end, robot.now));
         let effects = managed.effects();

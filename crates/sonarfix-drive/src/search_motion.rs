@@ -40,22 +40,31 @@ use sonarfix_link::Motion;
 pub struct Speeds {
     /// Straight ahead.
     pub ahead: MetresPerSecond,
-    /// On the spot.
+    /// On the spot, to another heading.
     pub turn: RadiansPerSecond,
+    /// Once around on the spot: the sonar sweeps meanwhile.
+    pub spin: RadiansPerSecond,
 }
 
 impl Speeds {
-    /// 0.25 m/s and 90°/s: a sweep of an HC-SR04 on an SG90 takes 1.2 s.
-    pub const SMALL: Self =
-        Self { ahead: MetresPerSecond(0.25), turn: RadiansPerSecond(core::f32::consts::FRAC_PI_2) };
+    /// 0.25 m/s, 90°/s and 45°/s: a sweep of an HC-SR04 on an SG90 takes 1.2 s.
+    pub const SMALL: Self = Self {
+        ahead: MetresPerSecond(0.25),
+        turn: RadiansPerSecond(core::f32::consts::FRAC_PI_2),
+        spin: RadiansPerSecond(core::f32::consts::FRAC_PI_4),
+    };
 
     /// The same, each at most so fast that no wheel is faster than half of the fastest.
     #[must_use]
     pub fn within(fastest: MetresPerSecond, track_width: Metres) -> Self {
         let most = 0.5 * fastest.0;
+        let turn = |small: RadiansPerSecond| {
+            RadiansPerSecond(at_most(small.0, 2.0 * most / track_width.0))
+        };
         Self {
             ahead: MetresPerSecond(at_most(Self::SMALL.ahead.0, most)),
-            turn: RadiansPerSecond(at_most(Self::SMALL.turn.0, 2.0 * most / track_width.0)),
+            turn: turn(Self::SMALL.turn),
+            spin: turn(Self::SMALL.spin),
         }
     }
 }
@@ -72,6 +81,7 @@ const BESIDE: f32 = 0.26;
 const PARALLEL: f32 = 0.035;
 /// The least distance from a wall beside the robot, as a part of the bumper distance.
 const ASIDE: f32 = 0.6;
+
 /// Travel without a ping, metres, after which the robot stands.
 const BLIND: f32 = 0.05;
 
@@ -90,7 +100,7 @@ const KNOWN: usize = 1;
 /// The least free travel of a heading to which the robot turns, metres; more than the second is not better.
 const LEAST_FREE: f32 = 0.4;
 const ENOUGH: f32 = 2.5;
-/// So much less free travel, metres, is as good as a turn by one sector less.
+/// What a turn by one sector costs, in metres of free travel.
 const BY_SECTOR: f32 = 0.026;
 
 /// The motion of a robot that searches.
@@ -125,7 +135,7 @@ pub struct SearchMover {
     bearing: f32,
     /// Whether the sweep goes to the left, once it is known.
     is_leftward: Option<bool>,
-    /// Turned since then, radians.
+    /// Turned since it stood, radians.
     turned: f32,
     /// Driven since the last ping, metres.
     blind: f32,
@@ -267,7 +277,10 @@ impl SearchMover {
             self.is_leftward = Some(step > 0.0);
         }
         // What was heard in a turn is kept until its end.
-        let left = if let State::Turning(left) = self.state { left } else { 0.0 };
+        let left = match self.state {
+            State::Turning(left) if !self.spins => left,
+            _ => 0.0,
+        };
         if left == 0.0 && before.is_some() && before != self.is_leftward {
             let [present, _] = self.sweeps;
             self.sweeps = [Sweep::EMPTY, present];
@@ -290,7 +303,7 @@ impl SearchMover {
         if let State::Turning(left) = &mut self.state {
             *left -= if self.was_left { turn } else { -turn };
             if *left <= 0.0 {
-                self.end_turn();
+                self.stand();
             }
             return;
         }
@@ -308,7 +321,8 @@ impl SearchMover {
     /// The motion until the next ping or travel.
     #[must_use]
     pub fn motion(&self) -> Motion {
-        let Speeds { ahead, turn } = self.speeds;
+        let Speeds { ahead, turn, spin } = self.speeds;
+        let turn = if self.spins { spin } else { turn };
         match self.state {
             State::Sweeping | State::Done => Motion::default(),
             State::Driving => Motion { speed: ahead, ..Motion::default() },
@@ -342,8 +356,8 @@ impl SearchMover {
         self.sweeps = [Sweep::EMPTY; 2];
     }
 
-    /// Ends a turn: the robot drives if it has looked ahead. One that has turned once around stays there.
-    fn end_turn(&mut self) {
+    /// Stands until it has looked ahead, which it may have done in a turn. One that has turned once around stays there.
+    fn stand(&mut self) {
         self.state = if self.spins { State::Done } else { State::Sweeping };
         self.turned = 0.0;
         self.blind = 0.0;
@@ -353,6 +367,6 @@ impl SearchMover {
     /// Forgets the echoes: the robot stands until there are new ones.
     fn sweep_again(&mut self) {
         self.sweeps = [Sweep::EMPTY; 2];
-        self.end_turn();
+        self.stand();
     }
 }

@@ -19,9 +19,8 @@ use crate::search_study::Plans;
 
 /// Time between two records of the pose, µs.
 const STEP: u64 = 20_000;
-/// So many of them are compared with an answer, which is of the last sample of the encoders, at most 100 ms ago: a robot that turns is
-/// elsewhere since then.
-const RECENT: usize = 6;
+/// So many of them are kept: an answer is of the last sample of the encoders, and a robot that turns is elsewhere since then.
+const RECENT: usize = 50;
 
 /// The outcome of one trial, which ends with the first pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -93,9 +92,11 @@ pub fn trial(
         trial.nearest = distances.fold(trial.nearest, f64::min);
         if robot.mode().is_some_and(|mode| mode != Mode::Searching) {
             trial.found_after = Some(since(time));
-            trial.is_right = robot
-                .localizer()
-                .is_some_and(|found| recent.iter().any(|pose| is_right(found, pose)));
+            trial.is_right = robot.localizer().is_some_and(|found| {
+                let age = (robot.now() - found.time().ticks()) / STEP;
+                let truth = usize::try_from(age).ok().and_then(|age| recent.get(age));
+                truth.is_some_and(|truth| is_right(found, truth))
+            });
         }
     }
     Ok(trial)

@@ -219,6 +219,6 @@ fn a_spin_is_one_full_turn() {
 fn the_speeds_are_those_of_the_robot() {
     let slow = Speeds::within(MetresPerSecond(0.1), Metres(0.2));
     assert_eq!(slow.ahead, MetresPerSecond(0.05));
-    assert_eq!(slow.turn, RadiansPerSecond(0.5));
+    assert_eq!((slow.turn, slow.spin), (RadiansPerSecond(0.5), RadiansPerSecond(0.5)));
     assert_eq!(Speeds::within(MetresPerSecond(10.0), Metres(0.2)), Speeds::SMALL);
 }
