@@ -50,7 +50,7 @@ pub struct Hypothesis {
     pub position_deviation: Metres,
     /// One deviation of the heading.
     pub heading_deviation: Radians,
-    /// Mean log-likelihood per ping, relative to a place without walls.
+    /// Mean of the weighted log-likelihood per ping, relative to a place without walls.
     pub fit: f32,
     /// The share of the pings with an echo that a wall or corner of the map explains.
     pub explained: f32,
@@ -65,7 +65,7 @@ pub struct Hypothesis {
 pub enum Answer {
     /// No cycle is complete, or too few pings are in the window.
     Searching,
-    /// So many hypotheses are within half the odds of a unique answer, the first ones of [`Search::hypotheses`].
+    /// So many hypotheses have nearly the evidence of the best one, it included, the first ones of [`Search::hypotheses`].
     Several(usize),
     /// The position along this wall is undetermined.
     Along {
@@ -327,8 +327,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         pings.filter_map(move |ping| {
             let placement = &best?.placement;
             let from = placed(placement, ping.station.at);
-            let echo = ping.range().map(|range| ping.axis.times(range));
-            let echo = echo.map(|offset| placed(placement, ping.station.at.plus(offset)));
+            let echo = ping.point().map(|at| placed(placement, at));
             Some((from.into(), echo.map(Point::from)))
         })
     }
@@ -359,7 +358,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             pose: Pose::new(now.at.x, now.at.y, Radians(rotation + self.window.heading())),
             position_deviation: Metres(libm::sqrtf(largest(spread.xx, spread.xy, spread.yy))),
             heading_deviation: Radians(libm::sqrtf(spread.rotation)),
-            fit: self.fit_of(entry),
+            fit: entry.score / at_least_one(entry.pings),
             explained: f32::from(entry.explained) / at_least_one(entry.echoes),
             drift: entry.placement.bend.drift,
             turn_scale: entry.placement.bend.turn_scale,

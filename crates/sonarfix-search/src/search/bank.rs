@@ -17,7 +17,7 @@ const SAME_ROTATION: f32 = 0.906;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Entry {
     pub placement: Placement,
-    /// Sum of the scores of all pings of the window.
+    /// Sum of the weighted scores of all pings of the window, relative to a place without walls.
     pub score: f32,
     /// What the pings of earlier cycles tell for it, relative to a place without walls; a ping counts in parts while it moves through
     /// the window ([`Entry::age`]).
@@ -71,8 +71,8 @@ impl Entry {
 
 /// So many windows of pings after which the past has faded to 1/e: odometry drifts, and a robot may be carried.
 const MEMORY: f32 = 5.0;
-/// Logarithm of the odds against a pose that was not found in earlier cycles: three quarters of those of an answer.
-const MISSED: f32 = 18.0;
+/// Logarithm of the odds against a pose that was not found in earlier cycles: the search does not find every pose at once.
+const MISSED: f32 = 10.5;
 
 #[derive(Debug, Clone)]
 pub(super) struct Bank<const HYPOTHESES: usize> {

@@ -20,7 +20,7 @@ pub(super) const OTHER_PAIRS: u8 = 4;
 pub(super) const CHECKED_LINES: u8 = 2;
 
 /// Candidates are rejected below this share of the best score, and so much below it: those of pairs, and those of the global check. A
-/// rival whose score is by more than the second lower is by more than half of the odds of an answer less probable.
+/// hypothesis whose score is by more than the second lower is no rival.
 const OF_PAIR: (f32, f32) = (0.25, f32::MAX);
 const OF_CHECK: (f32, f32) = (0.6, 30.0);
 
@@ -80,6 +80,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
 
     pub(super) fn vote(&mut self, ping: u16, tilt: u8) -> Task {
         let Some(part) = TILTS.get(usize::from(tilt)) else {
+            self.window.weigh(usize::from(ping));
             let next = ping + 1;
             return if usize::from(next) < self.window.pings().len() {
                 Task::Vote { ping: next, tilt: 0 }

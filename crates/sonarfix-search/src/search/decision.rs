@@ -10,13 +10,10 @@ use super::state::{Decision, Work};
 use super::trial::{Trial, count};
 use super::{Search, at_least_one, largest};
 
-/// Mean scores per ping at which the evidence counts not at all, and fully: where much of what is around is not in the map, pings
-/// that no wall explains come in groups.
-const UNTRUSTED: f32 = 0.4;
-const TRUSTED: f32 = 0.6;
-/// An answer needs less than the whole odds where the map explains more than this share of the echoes, and half of them where it explains all:
-/// what misleads a search is furniture. Chosen as `docs/search.md` states.
-const EXPLAINED: f32 = 0.8;
+/// An answer needs a logarithm of odds that is by so much larger if the map explained no echo: what misleads a search is furniture.
+const UNEXPLAINED: f32 = 22.0;
+/// Hypotheses are rivals whose evidence is less than this below that of the best one.
+const RIVAL: f32 = 6.0;
 /// So many global checks are made before an answer since the last rival, the last one with a clear lead.
 const CHECKS: u8 = 3;
 /// A global check is made at least once in so many cycles.
@@ -25,16 +22,6 @@ const CHECK_EVERY: u32 = 4;
 const UNDETERMINED: f32 = 0.3;
 
 impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> {
-    /// Mean log-likelihood per ping, relative to a place without walls.
-    pub(super) fn fit_of(&self, entry: &Entry) -> f32 {
-        self.gain(entry) / at_least_one(entry.pings)
-    }
-
-    /// What the pings of the window tell for an entry, relative to a place without walls.
-    fn gain(&self, entry: &Entry) -> f32 {
-        entry.score - self.echoes.nothing(entry.pings.into(), entry.echoes.into())
-    }
-
     /// Whether the lines are more than one wall.
     pub(super) fn has_separate_lines(&self) -> bool {
         let mut lines = self.lines.all();
@@ -59,7 +46,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             self.is_check_due = true;
             return;
         };
-        let least = best.evidence - 0.5 * self.parameters.odds;
+        let least = best.evidence - RIVAL;
         let rivals = self.bank.entries().iter().filter(|entry| entry.evidence > least).count();
         let spread = &best.spread;
         let variance = largest(spread.xx, spread.xy, spread.yy);
@@ -92,20 +79,17 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         };
     }
 
-    /// Logarithm of the odds of the best entry against the next, or a place without walls if that is more probable; less if
-    /// the pings hardly fit it.
-    pub(super) fn lead(&self, best: &Entry) -> f32 {
+    /// Logarithm of the odds of the best entry against the next, or a place without walls if that is more probable.
+    fn lead(&self, best: &Entry) -> f32 {
         let second = self.bank.entries().get(1).map_or(0.0, |entry| entry.evidence);
-        let mean = best.score / at_least_one(best.pings);
-        let trust = at_most(at_least((mean - UNTRUSTED) / (TRUSTED - UNTRUSTED), 0.0), 1.0);
-        trust * (best.evidence - at_least(second, 0.0))
+        best.evidence - at_least(second, 0.0)
     }
 
     /// Logarithm of the odds that an answer needs.
+    #[inline(never)]
     fn odds(&self, best: &Entry) -> f32 {
         let explained = f32::from(best.explained) / at_least_one(best.echoes);
-        let well = at_least(explained - EXPLAINED, 0.0) / (1.0 - EXPLAINED);
-        self.parameters.odds * (1.0 - 0.5 * well)
+        self.parameters.odds + UNEXPLAINED * (1.0 - explained)
     }
 
     /// Counts what so many new pings have moved through the window as past.
@@ -114,8 +98,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         // One that was proposed in this cycle has no score.
         let scored = self.bank.entries_mut().iter_mut().filter(|it| it.state == State::Fresh);
         for entry in scored {
-            let gain = entry.score - self.echoes.nothing(entry.pings.into(), entry.echoes.into());
-            entry.age(gain, share);
+            entry.age(entry.score, share);
         }
     }
 

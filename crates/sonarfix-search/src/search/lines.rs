@@ -111,7 +111,7 @@ impl Lines {
     #[inline(never)]
     pub fn vote_of_two(&mut self, pings: &[Ping], voter: usize, later: usize) {
         let (Some(one), Some(other)) = (pings.get(voter), pings.get(voter + later)) else { return };
-        let (Some(at), Some(to)) = (point(one), point(other)) else { return };
+        let (Some(at), Some(to)) = (one.point(), other.point()) else { return };
         let along = to.minus(at);
         let length = sqrt(along.length_squared());
         let is_apart = length >= APART.0 && length <= APART.1;
@@ -132,7 +132,7 @@ impl Lines {
         let (mut support, mut from, mut to) = (0, f32::INFINITY, f32::NEG_INFINITY);
         for ping in pings.iter().filter(|ping| self.supports(ping, line)) {
             let along = if self.is_light {
-                point(ping).map_or(0.0, |at| line.normal.left().dot(at))
+                ping.point().map_or(0.0, |at| line.normal.left().dot(at))
             } else {
                 line.normal.left().dot(ping.station.at)
             };
@@ -214,11 +214,6 @@ impl Lines {
             *slot = fitted;
         }
     }
-}
-
-/// The point that a ping of light has met.
-fn point(ping: &Ping) -> Option<Vector> {
-    Some(ping.station.at.plus(ping.axis.times(ping.range()?)))
 }
 
 /// Cosine of the angle between a ping's axis and a normal up to which the ping supports the line.

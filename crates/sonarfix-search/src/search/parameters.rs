@@ -21,8 +21,9 @@ pub struct SearchParameters {
     pub odometry: f32,
     /// What a ping returns besides the range of its wall.
     pub echo: EchoParameters,
-    /// Logarithm of the odds by which a unique answer leads every other hypothesis and a place without walls. Pings near each other share
-    /// the errors of map and odometry, so that it is far above that of odds of 1,000 to 1, 6.9. Half of it where the map explains every echo.
+    /// Logarithm of the odds by which a unique answer leads every other hypothesis and a place without walls, if the map explains every
+    /// echo; up to 22 more if it explains fewer. Pings near each other share the errors of map and odometry, so that it is above
+    /// that of odds of 1,000 to 1, 6.9.
     pub odds: f32,
     /// Largest deviations of position and heading of a unique answer.
     pub sharpness: (Metres, Radians),
@@ -37,7 +38,7 @@ impl Default for SearchParameters {
             turn_scale: 0.02,
             odometry: 0.015,
             echo: EchoParameters::HC_SR04,
-            odds: 24.0,
+            odds: 10.0,
             sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
     }

@@ -149,12 +149,13 @@ impl<'m> EchoModel<'m> {
         sqrt(Sharpness::SHARP * Sharpness::SHARP + self.noise)
     }
 
-    /// The score of so many pings, some of them with an echo, where the map has no wall.
-    #[inline(never)]
-    pub fn nothing(&self, pings: u16, echoes: u16) -> f32 {
-        let silent = f32::from(pings) - f32::from(echoes);
-        let echo = at_least(self.shares.before, LEAST_ECHO);
-        echo * f32::from(echoes) + at_least(SILENCE, self.shares.silence) * silent
+    /// The score of a ping, with or without an echo, where the map has no wall.
+    pub fn nothing(&self, has_echo: bool) -> f32 {
+        if has_echo {
+            at_least(self.shares.before, LEAST_ECHO)
+        } else {
+            at_least(SILENCE, self.shares.silence)
+        }
     }
 
     // ===== Eq. (31): p(z) over the density of an echo anywhere =====

@@ -27,7 +27,7 @@ impl Search<'_> {
         let at = Vector::from(pose.position()).minus(self.window.robot().at.turned(rotation));
         let placement = Placement { at, rotation, bend: self.window.bend() };
         let (pings, (position, heading)) = (10_u8, deviation);
-        let score = self.echoes.nothing(pings.into(), pings.into()) + fit * f32::from(pings);
+        let score = fit * f32::from(pings);
         let (xx, rotation) = (position * position, heading * heading);
         let spread = Spread { xx, xy: 0.0, yy: xx, rotation };
         let entry =
@@ -168,8 +168,7 @@ proptest! {
 
         let parameters = search.parameters;
         let explained = f64::from(best.explained) / f64::from(best.echoes.max(1));
-        // 24, less from 80 % on, 12 where the map explains every echo.
-        let (least, odds) = (12.0, 12.0 + (60.0 * (1.0 - explained)).min(12.0));
+        let (least, odds) = (6.0, 10.0 + 22.0 * (1.0 - explained));
         let evidence: Vec<f64> = bank.iter().map(|entry| f64::from(entry.evidence)).collect();
         let (variance, axis) = largest_of(&best.spread);
         let sharpness = (
@@ -177,9 +176,7 @@ proptest! {
         );
         let rotation = f64::from(best.spread.rotation);
         let rival = evidence.get(1).copied().unwrap_or(0.0).max(0.0);
-        // From 0.4 to 0.6 a ping the evidence counts more and more.
-        let trust = ((f64::from(best.score) / f64::from(best.pings) - 0.4) / 0.2).clamp(0.0, 1.0);
-        let lead = trust * (evidence[0] - rival);
+        let lead = evidence[0] - rival;
         prop_assume!(evidence.iter().skip(1).all(|other| is_clear(evidence[0] - other, least)));
         prop_assume!(is_clear(lead, odds) && is_clear(evidence[0], 0.0) && is_clear(variance, 0.09));
         prop_assume!(is_clear(variance / sharpness.0, 1.0) && is_clear(rotation / sharpness.1, 1.0));
@@ -191,9 +188,8 @@ proptest! {
         // What has moved through the window of 16 pings; the past fades in five windows.
         let share = (f64::from(fresh) / 16.0).min(1.0);
         let pasts: Vec<f64> = bank.iter().map(|entry| {
-            let nothing = f64::from(search.echoes.nothing(entry.pings.into(), entry.echoes.into()));
             let past = f64::from(entry.past);
-            past * (1.0 - share / 5.0) + share * (f64::from(entry.score) - nothing)
+            past * (1.0 - share / 5.0) + share * f64::from(entry.score)
         }).collect();
 
         search.decide(is_checked);

@@ -52,6 +52,7 @@ pub(super) struct Trial {
     /// Pings looked at in this stage, and those of them with an echo.
     seen: u16,
     echoes: u16,
+    /// Of their weighted scores, relative to a place without walls.
     sum: f32,
     /// The final score that must be within reach.
     least: f32,
@@ -101,7 +102,7 @@ impl Trial {
         odometry: &Odometry,
     ) -> Verdict {
         let Some(ping) = window.newest(usize::from(self.seen)) else {
-            return self.end_stage(odometry.prior, echoes, PINGS);
+            return self.end_stage(odometry.prior, PINGS);
         };
         let sharpness =
             Sharpness::new(self.deviation(echoes), odometry.per_metre * ping.station.travelled);
@@ -113,8 +114,9 @@ impl Trial {
             return Verdict::Running;
         };
         self.seen += 1;
-        self.echoes += u16::from(ping.range().is_some());
-        self.sum += explanation.score;
+        let has_echo = placed.beam.range.is_some();
+        self.echoes += u16::from(has_echo);
+        self.sum += ping.weight() * (explanation.score - echoes.nothing(has_echo));
         if let Some(target) = explanation.target {
             let by = Tolerance { deviation: sharpness.deviation, by_beam: echoes.by_beam };
             let placed = if echoes.is_light { placed.at_its_point() } else { placed };
@@ -168,7 +170,7 @@ impl Trial {
         rate * f32::from(self.seen) - LEAD
     }
 
-    fn end_stage(&mut self, prior: Prior, echoes: &EchoModel, most: usize) -> Verdict {
+    fn end_stage(&mut self, prior: Prior, most: usize) -> Verdict {
         match self.stage {
             Stage::Coarse => self.step(0, prior),
             Stage::Step(number) => self.step(number + 1, prior),
@@ -176,7 +178,7 @@ impl Trial {
                 placement: self.placement,
                 score: self.sum,
                 past: self.past,
-                evidence: self.evidence(echoes, most),
+                evidence: self.evidence(most),
                 pings: narrow(self.seen),
                 echoes: narrow(self.echoes),
                 explained: narrow(self.equations.count),
@@ -187,9 +189,8 @@ impl Trial {
     }
 
     /// The past, and what it does not hold of the pings: the newer, the more ([`Entry::age`]); of a full window half, on the mean.
-    fn evidence(&self, echoes: &EchoModel, most: usize) -> f32 {
-        let left = 1.0 - 0.5 * f32::from(self.seen) / count(most);
-        self.past + left * (self.sum - echoes.nothing(self.seen, self.echoes))
+    fn evidence(&self, most: usize) -> f32 {
+        self.past + (1.0 - 0.5 * f32::from(self.seen) / count(most)) * self.sum
     }
 
     /// Takes the Gauss–Newton step of a stage and begins the next.

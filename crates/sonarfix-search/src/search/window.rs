@@ -19,6 +19,14 @@ use sonarfix::geometry::vector::Vector;
 
 /// A ping is novel if no ping of the window was sent from within this distance, metres, in the same direction.
 const NOVEL_DISTANCE: f32 = 0.2;
+/// Echoes from within this distance, metres, of each other are of one place.
+const SAME_ECHO: f32 = 0.2;
+/// The bits of a range that hold the weight of its ping: they change the range by less than 1 in 32,000.
+const WEIGHT: u32 = 255;
+/// The whole weight, a multiple of 1 to 6.
+const WHOLE: u32 = 240;
+/// The sign of a range: there is no echo.
+const NO_ECHO: u32 = 1 << 31;
 
 /// How the heading by odometry departs from the true one: by wheels of unequal size, and by an error
 /// of the track width.
@@ -72,13 +80,28 @@ pub(super) struct Ping {
     pub station: Station,
     /// Unit vector along the beam.
     pub axis: Vector,
-    /// Metres; negative: no echo.
-    range: f32,
+    /// The bits of the range in metres, negative without an echo; the last ones, [`WEIGHT`], are the weight in parts of [`WHOLE`].
+    echo: u32,
 }
 
 impl Ping {
+    /// Metres; `None` without an echo.
     pub fn range(&self) -> Option<f32> {
-        (self.range >= 0.0).then_some(self.range)
+        (self.echo < NO_ECHO).then_some(f32::from_bits(self.echo & !WEIGHT))
+    }
+
+    /// The point on the axis at the range.
+    #[inline(never)]
+    pub fn point(&self) -> Option<Vector> {
+        Some(self.station.at.plus(self.axis.times(self.range()?)))
+    }
+
+    /// How much the ping tells: of echoes of one place from several stations the first tells all, the others 1/2, 1/3, and so on. An object
+    /// that is not in the map, or a wall that is elsewhere, misleads from each station in the same way.
+    pub fn weight(&self) -> f32 {
+        #[expect(clippy::cast_precision_loss, reason = "at most 255")]
+        let parts = (self.echo & WEIGHT) as f32;
+        parts * (1.0 / WHOLE as f32)
     }
 }
 
@@ -206,7 +229,24 @@ impl<const PINGS: usize> Window<PINGS> {
         }
         // There is room now, unless there is room for none.
         self.path.taken = self.path.taken.wrapping_add(1);
-        self.pings.push(Ping { station, axis, range: range.unwrap_or(-1.0) }).is_ok()
+        let echo = range.map_or(NO_ECHO, f32::to_bits) & !WEIGHT | WHOLE;
+        self.pings.push(Ping { station, axis, echo }).is_ok()
+    }
+
+    /// Weighs a ping by how many echoes of older pings are of the same place and were heard from other stations. A weight never grows: what
+    /// has left the window has told of the place all the same.
+    pub fn weigh(&mut self, number: usize) {
+        let Some((older, [ping, ..])) = self.pings.split_at_mut_checked(number) else { return };
+        let Some(point) = ping.point() else { return };
+        let here = ping.station.at;
+        let between = |one: Vector, other: Vector| one.minus(other).length_squared();
+        let is_repeated = |other: &&Ping| {
+            other.point().is_some_and(|at| between(at, point) < SAME_ECHO * SAME_ECHO)
+                && between(other.station.at, here) > NOVEL_DISTANCE * NOVEL_DISTANCE
+        };
+        let repeats = u32::try_from(older.iter().filter(is_repeated).count()).unwrap_or(WHOLE);
+        let weight = WHOLE / (1 + repeats);
+        ping.echo = ping.echo & !WEIGHT | weight.min(ping.echo & WEIGHT);
     }
 
     /// Makes the robot's present place the reference and returns it in the old frame.

@@ -67,8 +67,8 @@ proptest! {
             let least = (expected.len() == 4).then(|| expected[3].score);
             prop_assert_eq!(bank.least_score(), least);
             let least = expected.iter().map(|entry| entry.past).fold(f32::INFINITY, f32::min);
-            // No more than 18 below the best.
-            let least = least.max(expected[0].past - 18.0);
+            // No more than 10.5 below the best.
+            let least = least.max(expected[0].past - 10.5);
             prop_assert_eq!(bank.least_past().to_bits(), least.to_bits());
         }
     }

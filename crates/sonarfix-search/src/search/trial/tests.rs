@@ -80,7 +80,8 @@ fn stage(
         let placed = Placed::new(ping, placement, &chain);
         let sharpness = Sharpness::new(deviation, odometry.per_metre * ping.station.travelled);
         let explanation = echoes.explain(&placed.beam, sharpness);
-        sum.score += explanation.score;
+        let gain = explanation.score - echoes.nothing(ping.range().is_some());
+        sum.score += ping.weight() * gain;
         sum.echoes += u16::from(ping.range().is_some());
         if let Some(target) = explanation.target {
             let by = Tolerance { deviation: sharpness.deviation, by_beam: echoes.by_beam };
@@ -168,9 +169,8 @@ proptest! {
                 at = sum.equations.step(&at, prior).unwrap();
                 continue;
             }
-            let nothing = f64::from(echoes.nothing(u16::try_from(pings).unwrap(), sum.echoes));
             evidence = f64::from(past)
-                + (1.0 - f64::from(u16::try_from(pings).unwrap()) / (2.0 * 32.0)) * (f64::from(sum.score) - nothing);
+                + (1.0 - f64::from(u16::try_from(pings).unwrap()) / (2.0 * 32.0)) * f64::from(sum.score);
             let entry = Entry {
                 placement: at,
                 score: sum.score,

@@ -17,6 +17,11 @@ fn turned(vector: Wide, angle: f64) -> Wide {
     Rotation2::new(angle) * vector
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "the window takes f32")]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
 fn is_near(one: Wide, other: Wide) -> bool {
     (one - other).norm() < 2e-4
 }
@@ -102,7 +107,11 @@ impl Sent {
             && is_near(wide(ping.axis), turned(Wide::x(), self.direction))
             && (f64::from(ping.station.travelled) - self.robot.travelled).abs() < 1e-4
             && (f64::from(ping.station.turned) - self.robot.turned).abs() < 1e-4
-            && ping.range() == self.range
+            && match (ping.range(), self.range) {
+                (None, None) => true,
+                (Some(is), Some(range)) => (is - range).abs() < 1e-4,
+                _ => false,
+            }
     }
 }
 
@@ -162,6 +171,54 @@ proptest! {
         prop_assert_eq!(*window.robot(), Station::default());
         prop_assert_eq!((window.start(), window.since_start(), window.heading()), (Vector::default(), 0.0, 0.0));
         prop_assert_eq!((window.bend(), window.count(), window.taken()), (Bend::NONE, 0, 0));
+    }
+
+    /// An echo of a place of which n older ones were heard from other stations has the weight 1/(1 + n), a ping without an echo the whole;
+    /// also after older ones have left the window.
+    #[test]
+    fn of_the_echoes_of_one_place_from_several_stations_the_first_tells_most(
+        pings in prop::collection::vec(
+            (0_usize..3, prop::option::weighted(0.9, (0_usize..3, 0_usize..3))), 30..70,
+        ),
+        mount in mount(), several in 1_usize..8,
+    ) {
+        let mut window: Window<24> = Window::new(mount);
+        let (mut robot, mut sent): (_, Vec<(f64, Option<Wide>, u32)>) = (Robot::default(), Vec::new());
+        for (number, (step, place)) in pings.into_iter().enumerate() {
+            // Stations are 0, 12, or at least 24 cm apart; echoes up to 11, or at least 21 cm.
+            let advance = [0.0_f32, 0.12, 0.3][step];
+            window.drive(advance, 0.0);
+            robot.drive(&Step { advance, turn: 0.0, bearing: 0.0, range: None }, Bend::NONE);
+            let end = place.map(|(place, offset)| {
+                Wide::new([3.0, 5.0, 7.0][place] + [0.0, 0.1, 0.21][offset], [1.0, -2.0, 1.5][place])
+            });
+            let beam = end.unwrap_or_default() - robot.sonar(mount);
+            let range = end.map(|_| single(beam.norm()));
+            if !window.ping(single(beam.y.atan2(beam.x)), range, ALL) {
+                // In the very direction of one before.
+                continue;
+            }
+            sent.drain(..sent.len().saturating_sub(23));
+            sent.push((robot.axle.x, end, 0));
+            if number % several > 0 {
+                continue;
+            }
+            for number in 0..sent.len() {
+                window.weigh(number);
+                let (older, others) = sent.split_at_mut(number);
+                let (from, end, repeats) = &mut others[0];
+                let is_repeat = |other: &&(f64, Option<Wide>, u32)| {
+                    let apart = end.zip(other.1).map(|(end, at)| (end - at).norm());
+                    apart.is_some_and(|apart| apart < 0.2) && *from - other.0 > 0.2
+                };
+                let count = u32::try_from(older.iter().filter(is_repeat).count()).unwrap();
+                *repeats = count.max(*repeats);
+                let weight = f64::from(window.pings[number].weight());
+                // In whole parts of 240.
+                let expected = (240.0 / f64::from(1 + *repeats)).floor() / 240.0;
+                prop_assert!((weight - expected).abs() < 1e-6, "{weight} {repeats}");
+            }
+        }
     }
 
     /// A ping is taken if no other of the window was sent from within 30 cm in its direction; the oldest drops out.
