@@ -145,18 +145,19 @@ pub fn observed_trial(
     drive(&Simulation::new(searching(scenario, errors)), seed, (start, until), seconds, observer)
 }
 
-/// As [`trial`], of a robot that is set down anywhere, with the map of another place: no answer is right.
+/// As [`trial`], of a robot that is set down anywhere. It has this map, and its wheels have `wheels` times the errors of other trials.
 ///
 /// # Errors
 /// As of [`trial`].
-pub fn trial_elsewhere(
+pub fn mistaken_trial(
     scenario: Scenario,
     map: &Floor,
+    wheels: f64,
     seed: u64,
     seconds: f64,
 ) -> Result<Trial, TrialError> {
     let mut rng = stream(seed, 0);
-    let errors = wheel_errors(&mut rng);
+    let errors = wheel_errors(&mut rng).map(|error| wheels * error);
     let start = random_start(&scenario, seconds, &mut rng);
     let robot = scenario.robot;
     let simulation = Simulation::new(searching(scenario, errors)).believing(robot, map.walls());

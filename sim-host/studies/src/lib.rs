@@ -12,7 +12,7 @@
 //! | [`reality`] | `docs/reality.md` |
 //! | [`recordings`] | none: a table of recordings with their robot files |
 //! | [`rooms`] | `docs/rooms.md` |
-//! | [`search_motion`], [`search_study`] | `docs/search.md` |
+//! | [`search_motion`], [`search_study`], [`quantiles`] | `docs/search.md` |
 //! | [`sonar_model`] | `docs/sonar-model.md` |
 
 pub mod calibration;
@@ -26,6 +26,7 @@ pub mod floor_plan;
 pub mod health_page;
 pub mod kidnapped;
 pub mod peers;
+pub mod quantiles;
 pub mod reality;
 pub mod recordings;
 pub mod relocalization;

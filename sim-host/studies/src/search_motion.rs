@@ -14,7 +14,7 @@ use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::segment::{Segment, distance};
 use sonarfix_virtual_robot::robot::{Parts, VirtualRobot};
 
-use crate::search_bound::Quantiles;
+use crate::quantiles::Quantiles;
 use crate::search_study::Plans;
 
 /// Time between two records of the pose, µs.
@@ -165,13 +165,8 @@ mod tests {
     use crate::floor_plan::Kind;
 
     fn homes(kind: Option<SearchMotionKind>, seconds: f64) -> Vec<Trial> {
-        let plans = Plans {
-            first: 6_000,
-            trials: 6,
-            kind: Some(Kind::Home),
-            walls: None,
-            is_elsewhere: false,
-        };
+        let plans =
+            Plans { first: 6_000, trials: 6, kind: Some(Kind::Home), walls: None, mistake: None };
         floor_plans(&plans, kind, seconds, &|| ()).unwrap()
     }
 

@@ -1,12 +1,16 @@
-//! Global localization in simulation: trials in floor plans and in scenarios, and what they have in common.
+//! Global localization in simulation: trials in floor plans, also with a wrong map or robot file, and in scenarios.
 
 use rayon::prelude::*;
 use serde::Serialize;
 use sonarfix_map::{Floor, NamedWall, Scenario};
-use sonarfix_plan::trial::{SetDown, Trial, TrialError, trial, trial_elsewhere};
+use sonarfix_plan::trial::{SetDown, Trial, TrialError, mistaken_trial, trial};
 use sonarfix_sim::progress::Progress;
 
 use crate::floor_plan::{FloorPlan, Kind};
+use crate::quantiles::Quantiles;
+pub use mistake::Mistake;
+
+mod mistake;
 
 /// Which floor plans.
 #[derive(Debug, Clone, Copy)]
@@ -19,8 +23,8 @@ pub struct Plans {
     pub kind: Option<Kind>,
     /// Walls of each map: those of other plans stand far beside a plan, and a plan with more is left out.
     pub walls: Option<usize>,
-    /// Whether the robot has the map of another plan of the same kind.
-    pub is_elsewhere: bool,
+    /// What is wrong with the map or the robot file.
+    pub mistake: Option<Mistake>,
 }
 
 impl Plans {
@@ -70,18 +74,6 @@ const APART: f64 = 60.0;
 /// Seeds of the plans beside a plan, from its own.
 const BESIDE: u64 = 1_000_000;
 
-/// Another plan of this kind than that of the seed.
-fn another(seed: u64, kind: Kind) -> FloorPlan {
-    let mut number = seed.wrapping_add(BESIDE);
-    loop {
-        let plan = FloorPlan::new(number);
-        if plan.kind == kind {
-            return plan;
-        }
-        number = number.wrapping_add(1);
-    }
-}
-
 /// A floor with walls of other plans beside it, as many as make it `count`.
 fn filled(floor: &Floor, seed: u64, count: usize) -> Result<Floor, TrialError> {
     let mut walls = floor.named_walls().to_vec();
@@ -111,12 +103,11 @@ pub fn floor_plans(
     progress: &impl Progress,
 ) -> Result<Vec<Trial>, TrialError> {
     plans.each(progress, |scenario, seed| {
-        if !plans.is_elsewhere {
+        let Some(mistake) = plans.mistake else {
             return trial(scenario, seed, SetDown::Anywhere, seconds);
-        }
-        let kind = FloorPlan::new(seed).kind;
-        let other = another(seed, kind).scenario()?;
-        trial_elsewhere(scenario, &other.floor, seed, seconds)
+        };
+        let map = mistake.map(&scenario.floor, seed)?;
+        mistaken_trial(mistake.noisy(scenario), &map, mistake.wheels(), seed, seconds)
     })
 }
 
@@ -147,10 +138,8 @@ pub struct Summary {
     pub trials: usize,
     /// Share with a unique and right answer.
     pub unique_and_right: f64,
-    /// The same within 45 seconds.
-    pub right_within_45: f64,
-    /// Share with a unique and wrong answer.
-    pub unique_and_wrong: f64,
+    /// The times of the unique answers.
+    pub found: Quantiles,
     /// Share with the true pose in the bank at the end.
     pub in_bank: f64,
     /// Share with the true pose as the best hypothesis at the end.
@@ -185,14 +174,12 @@ impl Summary {
         let mean =
             |of: &dyn Fn(&Trial) -> f64| trials.iter().map(of).sum::<f64>() / trials.len() as f64;
         let evaluations = trials.iter().map(|trial| trial.evaluations as f64).sum::<f64>();
+        let found: Vec<_> = trials.iter().map(|t| (t.unique_after, t.is_right)).collect();
         let right = || trials.iter().filter(|trial| trial.is_right);
         Self {
             trials: trials.len(),
             unique_and_right: share(&|trial| trial.is_right),
-            right_within_45: share(&|trial| {
-                trial.is_right && trial.unique_after.is_some_and(|after| after <= 45.0)
-            }),
-            unique_and_wrong: share(&|trial| is_unique(trial) && !trial.is_right),
+            found: Quantiles::new(&found),
             in_bank: share(&|trial| trial.rank.is_some()),
             best_is_right: share(&|trial| trial.rank == Some(0)),
             with_all_twins: trials.iter().any(|trial| trial.has_all_twins.is_some()).then(|| {
@@ -224,8 +211,7 @@ mod tests {
     /// A plan keeps its walls, and those of other plans stand out of the sonar's range.
     #[test]
     fn a_map_is_filled_with_other_plans_beside_the_plan() -> Result<(), TrialError> {
-        let plans =
-            Plans { first: 43_000, trials: 3, kind: None, walls: Some(200), is_elsewhere: false };
+        let plans = Plans { first: 43_000, trials: 3, kind: None, walls: Some(200), mistake: None };
         for (seed, scenario) in plans.scenarios()? {
             let own = FloorPlan::new(seed).scenario()?.floor;
             let (own, all) = (own.named_walls(), scenario.floor.named_walls());
@@ -241,8 +227,7 @@ mod tests {
 
     #[test]
     fn plans_with_more_walls_are_left_out() -> Result<(), TrialError> {
-        let plans =
-            Plans { first: 43_000, trials: 3, kind: None, walls: Some(30), is_elsewhere: false };
+        let plans = Plans { first: 43_000, trials: 3, kind: None, walls: Some(30), mistake: None };
         for (seed, scenario) in plans.scenarios()? {
             assert!(FloorPlan::new(seed).scenario()?.floor.named_walls().len() <= 30);
             assert_eq!(scenario.floor.named_walls().len(), 30);
@@ -253,8 +238,7 @@ mod tests {
     /// No cycle is longer than all together, and none begins before there are twelve pings, of which each takes 4,800 evaluations.
     #[test]
     fn the_longest_cycle_is_one_of_all() -> Result<(), TrialError> {
-        let plans =
-            Plans { first: 43_000, trials: 2, kind: None, walls: None, is_elsewhere: false };
+        let plans = Plans { first: 43_000, trials: 2, kind: None, walls: None, mistake: None };
         for trial in floor_plans(&plans, 10.0, &|| ())? {
             assert!(trial.cycles > 1 && trial.longest_cycle > 0, "{trial:?}");
             assert!(trial.longest_cycle < trial.evaluations, "{trial:?}");

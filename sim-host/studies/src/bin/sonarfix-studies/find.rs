@@ -7,8 +7,9 @@ use sonarfix_map::{Scenario, with_cabinet};
 use sonarfix_plan::trial::Trial;
 use sonarfix_report::Table;
 use sonarfix_studies::floor_plan::Kind;
-use sonarfix_studies::search_bound::{self, Bounded, Quantiles, Times};
-use sonarfix_studies::search_study::{self, Plans, Summary};
+use sonarfix_studies::quantiles::Quantiles;
+use sonarfix_studies::search_bound::{self, Bounded, Times};
+use sonarfix_studies::search_study::{self, Mistake, Plans, Summary};
 use sonarfix_terminal::progress::Runs;
 
 use crate::output::{self, Output};
@@ -39,12 +40,12 @@ pub struct Args {
     /// Walls of the map of each floor plan: those of other plans stand beside it, and a plan with more is left out.
     #[arg(long, requires = "floor_plans", value_parser = clap::value_parser!(u16).range(1..))]
     walls: Option<u16>,
-    /// Gives each robot the map of another floor plan of the same kind: every answer is wrong.
+    /// A mistake in the map or the robot file of each floor plan.
     #[arg(long, requires = "floor_plans", conflicts_with = "walls")]
-    other_map: bool,
+    mistake: Option<Mistake>,
     /// Computes for each trial how soon its pings allow to find the pose: a grid of poses, with exact odometry and with that of the
     /// encoders.
-    #[arg(long, requires = "floor_plans", conflicts_with = "other_map")]
+    #[arg(long, requires = "floor_plans", conflicts_with = "mistake")]
     bound: bool,
     #[command(flatten)]
     output: Output,
@@ -57,8 +58,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         (_, Some(trials)) => {
             let kind = args.homes.then_some(Kind::Home);
             let walls = args.walls.map(usize::from);
-            let is_elsewhere = args.other_map;
-            let plans = Plans { first: args.seed, trials, kind, walls, is_elsewhere };
+            let mistake = args.mistake;
+            let plans = Plans { first: args.seed, trials, kind, walls, mistake };
             if args.bound {
                 return bound(&plans, args, runs);
             }
@@ -162,6 +163,7 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
     } else {
         format!("{:.1} s", summary.mean_seconds)
     };
+    let time = |after: Option<f64>| after.map_or("-".to_owned(), |after| format!("{after:.1} s"));
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let twins = summary.with_all_twins.map_or("no symmetry".to_owned(), percent);
@@ -171,8 +173,10 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
         columns: ["", "value"].map(str::to_owned).into(),
         rows: vec![
             row("unique and right", percent(summary.unique_and_right)),
-            row("the same within 45 s", percent(summary.right_within_45)),
-            row("unique and wrong", percent(summary.unique_and_wrong)),
+            row("half of them within", time(summary.found.half)),
+            row("80 % within", time(summary.found.four_fifths)),
+            row("95 % within", time(summary.found.nineteen_twentieths)),
+            row("unique and wrong", percent(summary.found.wrong)),
             row("true pose in the bank at the end", percent(summary.in_bank)),
             row("true pose and all twins among the answers", twins),
             row("true pose best at the end", percent(summary.best_is_right)),

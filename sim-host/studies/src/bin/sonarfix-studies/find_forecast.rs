@@ -54,13 +54,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         "--floor-plans, --trials and --starts must be at least 1"
     );
     let kind = args.homes.then_some(Kind::Home);
-    let plans = Plans {
-        first: args.seed,
-        trials: args.floor_plans,
-        kind,
-        walls: None,
-        is_elsewhere: false,
-    };
+    let plans =
+        Plans { first: args.seed, trials: args.floor_plans, kind, walls: None, mistake: None };
     let forecast = Settings {
         starts: args.starts,
         seconds: args.seconds,

@@ -47,7 +47,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     let kind = args.homes.then_some(Kind::Home);
     let (first, trials) = (args.seed, args.runs);
-    let plans = Plans { first, trials, kind, walls: None, is_elsewhere: false };
+    let plans = Plans { first, trials, kind, walls: None, mistake: None };
     let trials = find_standing::floor_plans(&plans, args.seconds, &runs)?;
     runs.end()?;
     args.output.print(("summary", &Summary::new(&trials)), &trials, table, trial_table)

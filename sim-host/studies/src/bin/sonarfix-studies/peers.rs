@@ -58,7 +58,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     let searched = [("all kinds", None), ("homes", Some(Kind::Home))].map(|(name, kind)| {
         let plans =
-            Plans { first: args.seed, trials: args.trials, kind, walls: None, is_elsewhere: false };
+            Plans { first: args.seed, trials: args.trials, kind, walls: None, mistake: None };
         Ok::<_, peers::PeerError>(Searched {
             name,
             found: peers::search(&plans, args.seconds, &progress)?,

@@ -49,7 +49,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     };
     let only = args.homes.then_some(Kind::Home);
     let plans =
-        Plans { first: args.seed, trials: args.runs, kind: only, walls: None, is_elsewhere: false };
+        Plans { first: args.seed, trials: args.runs, kind: only, walls: None, mistake: None };
     let runs = Runs::new(args.runs);
     let trials = search_motion::floor_plans(&plans, kind, args.seconds, &runs)?;
     runs.end()?;
