@@ -1975,7 +1975,7 @@ typedef struct {
    */
   float heading_deviation_rad;
   /*
-   Mean log-likelihood per ping, relative to a place without walls.
+   Mean weighted log-likelihood per ping, relative to a place without walls.
    */
   float fit;
   /*

@@ -142,7 +142,7 @@ impl Search {
         answer(self.0.borrow_dependent()).1
     }
 
-    /// The hypotheses as a table, the best first: pose now, deviations, ``fit`` (mean log-likelihood per ping), ``explained``
+    /// The hypotheses as a table, the best first: pose now, deviations, ``fit`` (mean weighted log-likelihood per ping), ``explained``
     /// (share of the echoes).
     #[getter]
     fn hypotheses(&self) -> PyResult<Table> {

@@ -118,7 +118,7 @@ pub struct sonarfix_hypothesis_t {
     pub position_deviation_m: f32,
     /// Standard deviation of the heading, radians.
     pub heading_deviation_rad: f32,
-    /// Mean log-likelihood per ping, relative to a place without walls.
+    /// Mean weighted log-likelihood per ping, relative to a place without walls.
     pub fit: f32,
     /// Share of the echoes that the map explains.
     pub explained: f32,

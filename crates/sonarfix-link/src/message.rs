@@ -292,7 +292,7 @@ pub struct RankedHypothesis {
     pub position_deviation: Metres,
     /// One deviation of the heading.
     pub heading_deviation: Radians,
-    /// Mean log-likelihood per ping, relative to echoes anywhere.
+    /// Mean weighted log-likelihood per ping, relative to a place without walls.
     pub fit: f32,
     /// The share of the echoes that the map explains.
     pub explained: f32,

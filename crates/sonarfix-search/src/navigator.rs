@@ -56,7 +56,7 @@ const CONFIRMED_BY: u16 = 20;
 /// A unique answer of the search is another pose than a provisional one beyond this distance, metres, or turn, radians.
 const ELSEWHERE: f32 = 0.5;
 const TURNED: f32 = 0.35;
-/// Mean log-likelihood per ping from which the best hypothesis is a guess of an unknown pose.
+/// Mean weighted log-likelihood per ping from which the best hypothesis is a guess of an unknown pose.
 const LEAST_GUESS: f32 = 0.2;
 /// Pings of a provisional pose without an accepted range after which the nearest wall is measured.
 const UNUSED: u16 = 3;

@@ -50,7 +50,7 @@ pub struct Hypothesis {
     pub position_deviation: Metres,
     /// One deviation of the heading.
     pub heading_deviation: Radians,
-    /// Mean of the weighted log-likelihood per ping, relative to a place without walls.
+    /// Mean weighted log-likelihood per ping, relative to a place without walls.
     pub fit: f32,
     /// The share of the pings with an echo that a wall or corner of the map explains.
     pub explained: f32,

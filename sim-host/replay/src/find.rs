@@ -38,7 +38,7 @@ pub struct Candidate {
     pub position_deviation: f64,
     /// Standard deviation of the heading, radians.
     pub heading_deviation: f64,
-    /// Mean log-likelihood per ping, relative to a place without walls.
+    /// Mean weighted log-likelihood per ping, relative to a place without walls.
     pub fit: f64,
     /// The share of the echoes that the map explains.
     pub explained: f64,
