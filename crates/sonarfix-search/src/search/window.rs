@@ -98,10 +98,9 @@ impl Ping {
 
     /// How much the ping tells: of echoes of one place from several stations the first tells all, the others 1/2, 1/3, and so on. An object
     /// that is not in the map, or a wall that is elsewhere, misleads from each station in the same way.
+    #[expect(clippy::cast_precision_loss, reason = "at most 255")]
     pub fn weight(&self) -> f32 {
-        #[expect(clippy::cast_precision_loss, reason = "at most 255")]
-        let parts = (self.echo & WEIGHT) as f32;
-        parts * (1.0 / WHOLE as f32)
+        (self.echo & WEIGHT) as f32 * (1.0 / WHOLE as f32)
     }
 }
 
