@@ -39,7 +39,7 @@ impl Default for SearchParameters {
             odometry: 0.015,
             echo: EchoParameters::HC_SR04,
             odds: 10.0,
-            sharpness: (Metres(0.05), Radians::from_degrees(2.5)),
+            sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
     }
 }
