@@ -8,6 +8,7 @@ use sonarfix_sim::progress::Progress;
 
 use crate::floor_plan::{FloorPlan, Kind};
 use crate::quantiles::Quantiles;
+use mistake::BESIDE;
 pub use mistake::Mistake;
 
 mod mistake;
@@ -71,8 +72,6 @@ impl Plans {
 
 /// Distance between two plans in one map, metres: more than the largest plan and the longest range.
 const APART: f64 = 60.0;
-/// Seeds of the plans beside a plan, from its own.
-const BESIDE: u64 = 1_000_000;
 
 /// A floor with walls of other plans beside it, as many as make it `count`.
 fn filled(floor: &Floor, seed: u64, count: usize) -> Result<Floor, TrialError> {

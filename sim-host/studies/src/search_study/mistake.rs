@@ -4,9 +4,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sonarfix_map::{FileError, Floor, NamedWall, Scenario};
 
-use super::BESIDE;
 use crate::floor_plan::FloorPlan;
 
+/// Seeds of other plans for a plan, from its own.
+pub(super) const BESIDE: u64 = 1_000_000;
 /// How far a wall of the map is from its place, metres.
 const MOVED: f64 = 0.2;
 /// Errors of wheels that are wrong, and noise that is too large, by those of other trials.
