@@ -289,6 +289,12 @@ impl Pico {
         self.pending.drain(..).collect()
     }
 
+    /// Takes all messages but the first ones, of this number, also those that [`Self::wait_for`] has dropped.
+    pub fn take_after(&mut self, number: usize) -> Vec<Telemetry> {
+        self.pending.clear();
+        self.heard[number..].to_vec()
+    }
+
     /// Waits for the first message for which `find` returns something; earlier ones are lost.
     pub fn wait_for<T>(&mut self, find: impl Fn(&Telemetry) -> Option<T>) -> Option<T> {
         for _ in 0..self.patience / SLICE {

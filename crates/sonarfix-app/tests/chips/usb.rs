@@ -38,9 +38,10 @@ fn driving_with(world: &World, order: &str) -> Pico {
 fn drive(pico: &mut Pico, times: u32) -> f64 {
     let mut worst = 0.0_f64;
     for _ in 0..times {
+        let before = pico.heard.len();
         answered(pico, &Command::Drive(MOTION));
         pico.run(80, &[]);
-        for message in pico.messages() {
+        for message in pico.take_after(before) {
             let Telemetry::Estimate(estimate) = message else { continue };
             let pose = estimate.state.pose();
             worst = worst.max(pico.truth(estimate.at).distance(pose.x.0, pose.y.0));

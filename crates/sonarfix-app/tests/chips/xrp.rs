@@ -63,9 +63,7 @@ fn an_xrp_that_a_pc_drives_in_a_circle_stays_within_15_mm() {
         let before = xrp.heard.len();
         done(xrp.order(&Command::Drive(MOTION)));
         xrp.run(80, &[]);
-        // Of all messages: the wait for an acknowledgement drops those before it.
-        let heard = xrp.heard[before..].to_vec();
-        for message in heard {
+        for message in xrp.take_after(before) {
             let Telemetry::Estimate(estimate) = message else { continue };
             let (truth, pose) = (xrp.truth(estimate.at), estimate.state.pose());
             worst = worst.max(truth.distance(pose.x.0, pose.y.0));
