@@ -107,11 +107,7 @@ impl Sent {
             && is_near(wide(ping.axis), turned(Wide::x(), self.direction))
             && (f64::from(ping.station.travelled) - self.robot.travelled).abs() < 1e-4
             && (f64::from(ping.station.turned) - self.robot.turned).abs() < 1e-4
-            && match (ping.range(), self.range) {
-                (None, None) => true,
-                (Some(is), Some(range)) => (is - range).abs() < 1e-4,
-                _ => false,
-            }
+            && ping.range() == self.range.map(|range| f32::from_bits(range.to_bits() & !WEIGHT))
     }
 }
 
