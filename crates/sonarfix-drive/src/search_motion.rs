@@ -81,7 +81,6 @@ const BESIDE: f32 = 0.26;
 const PARALLEL: f32 = 0.035;
 /// The least distance from a wall beside the robot, as a part of the bumper distance.
 const ASIDE: f32 = 0.6;
-
 /// Travel without a ping, metres, after which the robot stands.
 const BLIND: f32 = 0.05;
 

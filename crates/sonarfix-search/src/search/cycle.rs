@@ -20,7 +20,7 @@ pub(super) const OTHER_PAIRS: u8 = 4;
 pub(super) const CHECKED_LINES: u8 = 2;
 
 /// Candidates are rejected below this share of the best score, and so much below it: those of pairs, and those of the global check. A
-/// hypothesis whose score is by more than the second lower is no rival.
+/// hypothesis whose score is by more than the second lower is certainly no rival.
 const OF_PAIR: (f32, f32) = (0.25, f32::MAX);
 const OF_CHECK: (f32, f32) = (0.6, 30.0);
 

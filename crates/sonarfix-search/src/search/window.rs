@@ -21,7 +21,7 @@ use sonarfix::geometry::vector::Vector;
 const NOVEL_DISTANCE: f32 = 0.2;
 /// Echoes from within this distance, metres, of each other are of one place.
 const SAME_ECHO: f32 = 0.2;
-/// The bits of a range that hold the weight of its ping: they change the range by less than 1 in 32,000.
+/// The bits of a range that hold the weight of its ping: without them it is smaller by less than 1 in 32,000.
 const WEIGHT: u32 = 255;
 /// The whole weight, a multiple of 1 to 6.
 const WHOLE: u32 = 240;

@@ -109,8 +109,12 @@ pub fn bound_table(trials: &[Bounded]) -> Table {
     }
 }
 
+/// A time until an answer, if there is one.
+fn time(after: Option<f64>) -> String {
+    after.map_or("-".to_owned(), |after| format!("{after:.1} s"))
+}
+
 fn times_table(times: &Times, seconds: f64) -> Table {
-    let time = |after: Option<f64>| after.map_or("-".to_owned(), |after| format!("{after:.1} s"));
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let row = |share: &str, of: &Quantiles| {
         let times = [of.half, of.four_fifths, of.nineteen_twentieths].map(time);
@@ -163,7 +167,6 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
     } else {
         format!("{:.1} s", summary.mean_seconds)
     };
-    let time = |after: Option<f64>| after.map_or("-".to_owned(), |after| format!("{after:.1} s"));
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let twins = summary.with_all_twins.map_or("no symmetry".to_owned(), percent);
