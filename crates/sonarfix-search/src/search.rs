@@ -150,6 +150,8 @@ pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
     is_check_due: bool,
     /// Global checks since the last rival, which take turns with the lines.
     checks: u8,
+    /// Whether the last cycle has found an answer, which the next one refines.
+    is_found: bool,
     answer: Decision,
     region: Option<Region>,
 }
@@ -193,6 +195,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             taken: 0,
             is_check_due: true,
             checks: 0,
+            is_found: false,
             answer: Decision::Searching,
             region: None,
         }
@@ -216,6 +219,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.taken = 0;
         self.is_check_due = true;
         self.checks = 0;
+        self.is_found = false;
         self.answer = Decision::Searching;
         self.region = None;
     }

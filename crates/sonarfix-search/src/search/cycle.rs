@@ -64,6 +64,8 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         if self.bank.has_near(&entry.placement, SAME_PLACE) {
             self.answer = Decision::Unique(entry);
         }
+        // Its entry is still to be refined like the others.
+        self.bank.begin_refinement();
     }
 
     /// Makes a step of the task.
@@ -125,11 +127,14 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         }
     }
 
-    /// Tries the entries of the bank again, one after the other.
+    /// Tries the entries of the bank again, one after the other; before them the best one as the answer, if the last cycle has found one:
+    /// the frame is at the robot now, so that the odometry adds least to the pose until it is used.
     pub(super) fn refine(&mut self) -> Task {
         match self.bank.next_stale() {
             Some(entry) => {
-                self.work = Work::Trial(Trial::of_entry(&entry));
+                let mut trial = Trial::of_entry(&entry);
+                trial.is_answer = core::mem::take(&mut self.is_found);
+                self.work = Work::Trial(trial);
                 Task::Bank
             }
             None => Task::Pairs { pair: 0, pairs: Pairs::default() },

@@ -6,8 +6,8 @@ use sonarfix::geometry::vector::Vector;
 use sonarfix::map::WallId;
 
 use super::bank::{Entry, State};
-use super::state::{Decision, Work};
-use super::trial::{Trial, count};
+use super::state::Decision;
+use super::trial::count;
 use super::{Search, at_least_one, largest};
 
 /// An answer needs a logarithm of odds that is by so much larger if the map explained no echo: what misleads a search is furniture.
@@ -72,7 +72,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             along
         } else if is_clear && is_checked {
             // The answer before stays until this one is refined.
-            self.work = Work::Trial(Trial::of_answer(&best));
+            self.is_found = true;
             return;
         } else {
             Decision::Several(rivals)

@@ -88,11 +88,6 @@ impl Trial {
         }
     }
 
-    /// The entry that becomes the unique answer.
-    pub fn of_answer(entry: &Entry) -> Self {
-        Self { is_answer: true, ..Self::of_entry(entry) }
-    }
-
     /// Looks at one ping, or at a part of what may answer it.
     #[inline(never)]
     pub fn advance<const PINGS: usize>(

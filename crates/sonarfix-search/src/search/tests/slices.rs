@@ -254,6 +254,35 @@ proptest! {
     }
 }
 
+/// An answer is refined from the place of the robot, before the hypotheses, of which it stays one.
+#[test]
+fn an_answer_is_refined_before_the_hypotheses() {
+    for is_found in [false, true] {
+        let walls = room();
+        let mut search = search(&walls);
+        ping(&mut search, 14);
+        for x in [2.0, 4.0] {
+            search.propose(Pose::new(x, 2.0, Radians(0.0))).unwrap();
+        }
+        search.odometry(Metres(0.5), Radians(0.0)).unwrap();
+        search.is_found = is_found;
+        until_end_of(&mut search, Phase::Lines);
+        search.poll(1);
+        let best = search.bank.entries()[0];
+        assert_eq!((best.state, best.placement.at), (State::InTrial, Vector::new(2.5, 2.0)));
+        let mut expected = Trial::of_entry(&best);
+        expected.is_answer = is_found;
+        assert_eq!(format!("{:?}", search.work), format!("{:?}", Work::Trial(expected)));
+        assert!(!search.is_found);
+        let mut trials = 0;
+        while matches!(search.task, Task::Bank) {
+            trials += u32::from(matches!(search.work, Work::None));
+            search.poll(1);
+        }
+        assert_eq!(trials, 2 + u32::from(is_found));
+    }
+}
+
 /// The refinement of an answer may not move it away from its hypothesis.
 #[test]
 fn an_answer_is_near_a_hypothesis() {

@@ -139,7 +139,7 @@ proptest! {
         let (trial, stages) = match kind {
             0 => (Trial::of_candidate(placement, least, past), Vec::from([coarse, steps[0], steps[1]])),
             1 => (Trial::of_entry(&entry), Vec::from([steps[0], steps[1]])),
-            _ => (Trial::of_answer(&entry), Vec::from(steps)),
+            _ => (Trial { is_answer: true, ..Trial::of_entry(&entry) }, Vec::from(steps)),
         };
         let last = if kind == 2 { steps[3] } else { steps[1] };
         prop_assert_eq!(trial.is_answer, kind == 2);
