@@ -164,7 +164,9 @@ impl Equations {
         let [.., by_drift, by_turn_scale] = &mut right;
         *by_drift -= by_prior.drift * placement.bend.drift;
         *by_turn_scale -= by_prior.turn_scale * placement.bend.turn_scale;
-        let [dx, dy, turn, drift, turn_scale] = self.solve(damping, right)?;
+        let mut columns = [right];
+        self.solve(damping, &mut columns)?;
+        let [[dx, dy, turn, drift, turn_scale]] = columns;
         let moved = libm::sqrtf(dx * dx + dy * dy);
         let turned = turn.abs() / WIDEST_TURN;
         let excess = if moved > turned * LONGEST_STEP { moved / LONGEST_STEP } else { turned };
@@ -185,57 +187,56 @@ impl Equations {
     pub fn spread(&self, prior: Prior) -> Spread {
         let by_prior = prior.weights();
         let diagonal = [0.01, 0.01, 0.1, by_prior.drift, by_prior.turn_scale];
-        let by = |unit| self.solve(diagonal, unit).unwrap_or([100.0, 100.0, 10.0, 1.0, 1.0]);
-        let ([xx, xy, ..], [_, yy, ..]) =
-            (by([1.0, 0.0, 0.0, 0.0, 0.0]), by([0.0, 1.0, 0.0, 0.0, 0.0]));
-        let [_, _, rotation, ..] = by([0.0, 0.0, 1.0, 0.0, 0.0]);
+        let mut columns = [
+            [1.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0, 0.0],
+        ];
+        if self.solve(diagonal, &mut columns).is_none() {
+            return Spread { xx: 100.0, xy: 0.0, yy: 100.0, rotation: 10.0 };
+        }
+        let [[xx, xy, ..], [_, yy, ..], [_, _, rotation, ..]] = columns;
         Spread { xx, xy, yy, rotation }
     }
 
-    /// Elimination without pivoting: the matrix is positive definite by its diagonal.
+    /// Elimination without pivoting: the matrix is positive definite by its diagonal. Columns of right sides become their solutions.
+    #[inline(never)]
     fn solve(
         &self,
         diagonal: [f32; PARAMETERS],
-        right: [f32; PARAMETERS],
-    ) -> Option<[f32; PARAMETERS]> {
+        columns: &mut [[f32; PARAMETERS]],
+    ) -> Option<()> {
         let mut rows = self.rows;
-        let [[a, ..], [_, b, ..], [_, _, c, ..], [.., d, _], [.., e]] = &mut rows;
-        for (cell, add) in [a, b, c, d, e].into_iter().zip(diagonal) {
-            *cell += add;
+        for (k, add) in diagonal.into_iter().enumerate() {
+            *rows.get_mut(k)?.get_mut(k)? += add;
         }
-        let [p, mut q, mut r, mut s, mut t] = rows;
-        let [rp, mut rq, mut rr, mut rs, mut rt] = right;
-        let eliminate =
-            |row: &mut [f32; PARAMETERS], right: &mut f32, factor: f32, by, by_right| {
-                let by: &[f32; PARAMETERS] = by;
+        for k in 0..PARAMETERS {
+            let (done, below) = rows.split_at_mut_checked(k + 1)?;
+            let by = done.get(k)?;
+            for (i, row) in (k + 1..).zip(below) {
+                let factor = row.get(k)? / by.get(k)?;
                 for (cell, by) in row.iter_mut().zip(by) {
                     *cell -= factor * by;
                 }
-                *right -= factor * by_right;
-            };
-        for (row, right) in
-            [(&mut q, &mut rq), (&mut r, &mut rr), (&mut s, &mut rs), (&mut t, &mut rt)]
-        {
-            let factor = row[0] / p[0];
-            eliminate(row, right, factor, &p, rp);
+                for column in columns.iter_mut() {
+                    let by = *column.get(k)?;
+                    *column.get_mut(i)? -= factor * by;
+                }
+            }
         }
-        for (row, right) in [(&mut r, &mut rr), (&mut s, &mut rs), (&mut t, &mut rt)] {
-            let factor = row[1] / q[1];
-            eliminate(row, right, factor, &q, rq);
+        for column in columns {
+            for k in (0..PARAMETERS).rev() {
+                let row = rows.get(k)?;
+                let (known, solved) = column.split_at_mut_checked(k + 1)?;
+                let value = known.last_mut()?;
+                for (cell, other) in row.iter().skip(k + 1).zip(solved).rev() {
+                    *value -= cell * *other;
+                }
+                *value /= row.get(k)?;
+                value.is_finite().then_some(())?;
+            }
         }
-        for (row, right) in [(&mut s, &mut rs), (&mut t, &mut rt)] {
-            let factor = row[2] / r[2];
-            eliminate(row, right, factor, &r, rr);
-        }
-        let factor = t[3] / s[3];
-        eliminate(&mut t, &mut rt, factor, &s, rs);
-        let v = rt / t[4];
-        let w = (rs - s[4] * v) / s[3];
-        let z = (rr - r[4] * v - r[3] * w) / r[2];
-        let y = (rq - q[4] * v - q[3] * w - q[2] * z) / q[1];
-        let x = (rp - p[4] * v - p[3] * w - p[2] * z - p[1] * y) / p[0];
-        let solution = [x, y, z, w, v];
-        solution.iter().all(|value| value.is_finite()).then_some(solution)
+        Some(())
     }
 }
 
