@@ -66,7 +66,7 @@ impl SearchParameters {
         let odometry = at_least(1.2 * per_root_metre, LEAST_ODOMETRY);
         let (position, heading) = Self::default().sharpness;
         Self {
-            drift: Radians(at_least(OF_PRIOR * difference / width, LEAST_DRIFT.0)),
+            drift: Radians(at_least(difference / width, LEAST_DRIFT.0)),
             turn_scale: at_least(
                 libm::sqrtf(by_width * by_width + common * common),
                 LEAST_TURN_SCALE,
@@ -93,9 +93,6 @@ fn mean_and_difference([right, left]: [f32; 2], config: &Config) -> (f32, f32) {
 
 /// A unique answer need not be sharper than what the odometry adds within this distance, metres.
 const SHARP_WITHIN: f32 = 1.8;
-/// The search expects deviations of the drift by so many of those of the robot file: with less, wheels that are wrong by three deviations
-/// leave the heading of an answer wrong by 10° and more.
-const OF_PRIOR: f32 = 2.0;
 /// Least deviations: a prior of zero would fix what a slip changes.
 const LEAST_DRIFT: Radians = Radians(0.005);
 const LEAST_TURN_SCALE: f32 = 0.003;

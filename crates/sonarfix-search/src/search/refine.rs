@@ -34,10 +34,15 @@ pub(super) struct Prior {
 }
 
 impl Prior {
-    /// Inverse variances.
-    fn weights(self) -> Bend {
-        let weight = |deviation: f32| 1.0 / (deviation * deviation);
-        Bend { drift: weight(self.drift), turn_scale: weight(self.turn_scale) }
+    // ===== Eq. (34): w_κ and w_τ =====
+    /// Inverse variances for a bend: the larger it is, the less its prior tells, because wheels may be wrong by more than the robot file
+    /// says.
+    fn weights(self, bend: Bend) -> Bend {
+        let weight = |deviation: f32, of: f32| 1.0 / (deviation * deviation + 2.0 * of * of);
+        Bend {
+            drift: weight(self.drift, bend.drift),
+            turn_scale: weight(self.turn_scale, bend.turn_scale),
+        }
     }
 }
 
@@ -156,7 +161,7 @@ impl Equations {
     // ===== Eq. (34): Δ =====
     /// The placement after a step, shortened if it leads too far.
     pub fn step(&self, placement: &Placement, prior: Prior) -> Option<Placement> {
-        let by_prior = prior.weights();
+        let by_prior = prior.weights(placement.bend);
         let position = 1.0 / (POSITION * POSITION);
         let damping =
             [position, position, 1.0 / (ROTATION * ROTATION), by_prior.drift, by_prior.turn_scale];
@@ -185,13 +190,10 @@ impl Equations {
 
     /// The inverse of the information, with a prior of 10 m and π.
     pub fn spread(&self, prior: Prior) -> Spread {
-        let by_prior = prior.weights();
+        let by_prior = prior.weights(Bend::NONE);
         let diagonal = [0.01, 0.01, 0.1, by_prior.drift, by_prior.turn_scale];
-        let mut columns = [
-            [1.0, 0.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0, 0.0, 0.0],
-        ];
+        let mut columns =
+            [[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0]];
         if self.solve(diagonal, &mut columns).is_none() {
             return Spread { xx: 100.0, xy: 0.0, yy: 100.0, rotation: 10.0 };
         }
@@ -201,11 +203,7 @@ impl Equations {
 
     /// Elimination without pivoting: the matrix is positive definite by its diagonal. Columns of right sides become their solutions.
     #[inline(never)]
-    fn solve(
-        &self,
-        diagonal: [f32; PARAMETERS],
-        columns: &mut [[f32; PARAMETERS]],
-    ) -> Option<()> {
+    fn solve(&self, diagonal: [f32; PARAMETERS], columns: &mut [[f32; PARAMETERS]]) -> Option<()> {
         let mut rows = self.rows;
         for (k, add) in diagonal.into_iter().enumerate() {
             *rows.get_mut(k)?.get_mut(k)? += add;

@@ -285,7 +285,7 @@ proptest! {
         let mean = (0.5 * independent.powi(2) - 0.25 * difference.powi(2)).sqrt();
         let odometry = (1.2 * std::f64::consts::SQRT_2 * wide(noise) / wide(width)).max(0.005);
         for (is, expected) in [
-            (is.drift.0, (2.0 * difference / wide(width)).max(0.005)),
+            (is.drift.0, (difference / wide(width)).max(0.005)),
             (is.turn_scale, (wide(track) / wide(width)).hypot(mean).max(0.003)),
             (is.odometry, odometry),
             (is.sharpness.0.0, (1.8 * odometry).max(0.05)),

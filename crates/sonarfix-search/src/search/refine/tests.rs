@@ -106,9 +106,10 @@ proptest! {
             (placed, Target { residual, off_axis: target.off_axis + turn, ..target }, by)
         }).collect();
         let (information, mut right) = normal_equations(&pings);
-        let deviations = [0.5, 0.5, 0.3, prior.drift.into(), prior.turn_scale.into()];
-        let damping = diagonal(deviations);
         let (drift, turn_scale) = (f64::from(placement.bend.drift), f64::from(placement.bend.turn_scale));
+        let expected = |prior: f32, of: f64| f64::from(prior).hypot(2.0_f64.sqrt() * of);
+        let (by_drift, by_turn_scale) = (expected(prior.drift, drift), expected(prior.turn_scale, turn_scale));
+        let damping = diagonal([0.5, 0.5, 0.3, by_drift, by_turn_scale]);
         right -= damping * Row::from([0.0, 0.0, 0.0, drift, turn_scale]);
         let step = (information + damping).cholesky().unwrap().solve(&right);
         let moved = step[0].hypot(step[1]);
