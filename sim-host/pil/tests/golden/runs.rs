@@ -126,7 +126,7 @@ fn two_searches() {
     scenario.robot.start = StartPose::Unknown { region: None };
     let kind = FaultKind::DeadEncoder(Wheel::Right);
     scenario.faults = vec![Fault { kind, from: 120.0, to: 140.0 }];
-    assert!(assert_recorded("searches", scenario, 300.0) >= 2);
+    assert!(assert_recorded("searches", scenario, 240.0) >= 2);
 }
 
 /// The start without a pose, but with a region.
