@@ -53,14 +53,14 @@
 /*
  64-bit words of a localizer.
  */
-#define SONARFIX_LOCALIZER_WORDS 232
+#define SONARFIX_LOCALIZER_WORDS 236
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a localizer.
  */
-#define SONARFIX_LOCALIZER_WORDS 227
+#define SONARFIX_LOCALIZER_WORDS 231
 #endif
 
 /*
@@ -91,14 +91,14 @@
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1419
+#define SONARFIX_ROBOT_WORDS 1423
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1382
+#define SONARFIX_ROBOT_WORDS 1386
 #endif
 
 #if defined(SONARFIX_64_BIT)
@@ -450,7 +450,7 @@ enum sonarfix_verdict_t
    */
   SONARFIX_VERDICT_DEGRADED = 1,
   /*
-   Ranges keep disagreeing: the pose is probably wrong.
+   Ranges keep disagreeing, or the path has led through a wall: the pose is probably wrong.
    */
   SONARFIX_VERDICT_LOST = 2,
 };

@@ -22,10 +22,10 @@ use crate::tracker::Tracker;
 
 /// 64-bit words of a localizer.
 #[cfg(target_pointer_width = "64")]
-pub const SONARFIX_LOCALIZER_WORDS: usize = 232;
+pub const SONARFIX_LOCALIZER_WORDS: usize = 236;
 /// 64-bit words of a localizer.
 #[cfg(not(target_pointer_width = "64"))]
-pub const SONARFIX_LOCALIZER_WORDS: usize = 227;
+pub const SONARFIX_LOCALIZER_WORDS: usize = 231;
 
 /// A localizer in memory of the caller. It must not be copied.
 #[repr(C)]

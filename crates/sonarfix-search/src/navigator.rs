@@ -147,6 +147,8 @@ impl Calibration {
 impl<'m> Navigator<'m> {
     /// A navigator that tracks the pose of this localizer.
     #[must_use]
+    // It is built where the caller has it, without a copy on the stack.
+    #[inline]
     pub fn new(localizer: Localizer<'m>) -> Self {
         let checkpoint = Calibration::of(&localizer);
         Self {

@@ -20,10 +20,10 @@ const _: () = assert!(SONARFIX_STORE_SIZE == CAPACITY);
 
 /// 64-bit words of a robot.
 #[cfg(target_pointer_width = "64")]
-pub const SONARFIX_ROBOT_WORDS: usize = 1419;
+pub const SONARFIX_ROBOT_WORDS: usize = 1423;
 /// 64-bit words of a robot.
 #[cfg(not(target_pointer_width = "64"))]
-pub const SONARFIX_ROBOT_WORDS: usize = 1382;
+pub const SONARFIX_ROBOT_WORDS: usize = 1386;
 
 /// A robot in memory of the caller. It must not be copied or moved.
 #[repr(C)]

@@ -91,6 +91,28 @@ impl Choice {
         }
     }
 
+    /// What is to be done next.
+    fn step(&mut self) -> Step {
+        let Some(tested) = self.tested else { return Step::List };
+        let Some(&ranked) = self.ranked.get(usize::from(tested)) else {
+            // All of them are occluded, of which the last is in the last place.
+            let [.., last] = self.ranked;
+            self.list_after(last);
+            return Step::ListMore;
+        };
+        if ranked != Ranked::NONE {
+            self.tested = Some(tested + 1);
+            return Step::Test(ranked);
+        }
+        if self.is_daring {
+            return Step::End;
+        }
+        // No wall is safe: others are tried.
+        self.is_daring = true;
+        self.list_after(Ranked::BEFORE_ALL);
+        Step::Dare
+    }
+
     /// Begins another list, of the candidates after this one.
     #[inline(never)]
     fn list_after(&mut self, after: Ranked) {
@@ -98,6 +120,20 @@ impl Choice {
         self.ranked = [Ranked::NONE; SHORTLIST];
         (self.count, self.taken, self.tested) = (0, 0, None);
     }
+}
+
+/// A step of a choice.
+enum Step {
+    /// Candidates are listed.
+    List,
+    /// Another list has begun.
+    ListMore,
+    /// Another list has begun, without the margins for the uncertainty of the estimate.
+    Dare,
+    /// The best candidate that was not tested is tested.
+    Test(Ranked),
+    /// There is no candidate.
+    End,
 }
 
 impl<'a> Situation<'a> {
@@ -150,7 +186,7 @@ impl<'a> Situation<'a> {
         match self.planner::<P>(choice) {
             Ok(mut planner) => {
                 if choice.is_daring {
-                    planner.drop_margins();
+                    planner.view.drop_margins();
                 }
                 planner.proceed(choice, SLICE)
             }
@@ -195,31 +231,23 @@ impl<P: BearingRule> Planner<'_, P> {
     /// Makes a slice of a choice: lists candidates by this much work, or tests one of the list.
     #[inline(never)]
     fn proceed(&mut self, choice: &mut Choice, work: u32) -> Option<Result<Aim, NoAim>> {
-        let Some(tested) = choice.tested else {
-            let is_complete = match self.sonar.ranging {
-                Ranging::Sound => self.list_walls(choice, work),
-                Ranging::Light(beam) => self.list_beams(beam, choice),
-            };
-            choice.tested = is_complete.then_some(0);
-            return None;
-        };
-        let Some(&ranked) = choice.ranked.get(usize::from(tested)) else {
-            // All of them are occluded, of which the last is in the last place.
-            let [.., last] = choice.ranked;
-            choice.list_after(last);
-            return None;
-        };
-        if ranked == Ranked::NONE {
-            if choice.is_daring {
-                return Some(Err(NoAim::NoWall));
+        let ranked = match choice.step() {
+            Step::Test(ranked) => ranked,
+            Step::List => {
+                let is_complete = match self.sonar.ranging {
+                    Ranging::Sound => self.list_walls(choice, work),
+                    Ranging::Light(beam) => self.list_beams(beam, choice),
+                };
+                choice.tested = is_complete.then_some(0);
+                return None;
             }
-            // No wall is safe: others are tried.
-            choice.is_daring = true;
-            choice.list_after(Ranked::BEFORE_ALL);
-            self.drop_margins();
-            return None;
-        }
-        choice.tested = Some(tested + 1);
+            Step::ListMore => return None,
+            Step::Dare => {
+                self.view.drop_margins();
+                return None;
+            }
+            Step::End => return Some(Err(NoAim::NoWall)),
+        };
         let (id, candidate) = match self.sonar.ranging {
             Ranging::Sound => {
                 let id = WallId(ranked.number);
@@ -227,13 +255,8 @@ impl<P: BearingRule> Planner<'_, P> {
             }
             Ranging::Light(beam) => self.by_light(beam, ranked.number)?,
         };
-        let is_free = !self.is_occluded(id, &candidate);
+        let is_free = !candidate.is_occluded(id, &self.view, self.map);
         is_free.then(|| Ok(candidate.aim(self.ranger, id, choice.count)))
-    }
-
-    /// The walls are chosen without the margins for the uncertainty of the estimate.
-    fn drop_margins(&mut self) {
-        self.view.drop_margins();
     }
 
     /// Lists the next walls, by this much work; returns whether they are the last.

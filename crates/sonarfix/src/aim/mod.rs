@@ -323,14 +323,6 @@ impl<P: BearingRule> Planner<'_, P> {
         }
         if turn_to(bearing, right).abs() < turn_to(bearing, left).abs() { right } else { left }
     }
-
-    /// Whether another wall of the map returns an earlier echo.
-    fn is_occluded(&self, target: WallId, candidate: &Candidate) -> bool {
-        let beam = Beam::new(&self.view, &candidate.expected);
-        self.map
-            .near(self.view.position(), beam.reach())
-            .any(|(id, wall)| id != target && beam.is_occluded_by(&wall))
-    }
 }
 
 /// The smallest turn to a bearing from another one. Not inlined, because it is needed at several places.
@@ -345,6 +337,14 @@ fn score(policy: Policy, gain: SquareMetres, success: f32, range: Metres, second
 }
 
 impl Candidate {
+    /// Whether another wall of the map than its own returns an earlier echo.
+    #[inline(never)]
+    fn is_occluded(&self, own: WallId, view: &Viewpoint, map: &Map<'_>) -> bool {
+        let beam = Beam::new(view, &self.expected);
+        map.near(view.position(), beam.reach())
+            .any(|(id, wall)| id != own && beam.is_occluded_by(&wall))
+    }
+
     fn aim(&self, ranger: RangerId, wall: WallId, candidates: u16) -> Aim {
         let why = Reason {
             gain: self.gain,

@@ -33,6 +33,8 @@
 //!   quarter of the cone.
 //! - *Unmeasurable*: the same with half of the cone, at which no wall can be measured.
 //!
+//! A path through a wall makes the verdict `Lost` (eq. 59).
+//!
 //! Whatever the outcomes, the verdict is not `Tracking` after [`DEGRADED_WITHOUT_FIX`] without a used
 //! range or [`DEGRADED_WITHOUT_ODOMETRY`] without odometry, and `Lost` after
 //! [`LOST_WITHOUT_ODOMETRY`].
@@ -61,7 +63,7 @@ pub enum Verdict {
     Tracking,
     /// Ranges are missing or begin to disagree: the estimate depends on the encoders.
     Degraded,
-    /// Ranges keep disagreeing: the pose is probably wrong.
+    /// Ranges keep disagreeing, or the path has led through a wall: the pose is probably wrong.
     Lost,
 }
 
@@ -251,6 +253,12 @@ impl Health {
             self.average_nis(nis);
         }
         self.worsen(limits);
+    }
+
+    /// Records that the estimated path has led through a wall.
+    pub(crate) fn record_passage(&mut self) {
+        self.evidence = LOST_AT;
+        self.verdict = Verdict::Lost;
     }
 
     fn accept(&mut self, nis: f32, limits: &Limits) {

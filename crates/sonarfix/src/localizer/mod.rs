@@ -11,11 +11,13 @@ mod absolute;
 mod measurement;
 mod mode;
 mod mount;
+mod passage;
 mod ping;
 mod travel;
 pub(crate) mod unseen;
 
 use self::mount::StatedMount;
+use self::passage::Path;
 use self::unseen::Unseen;
 use crate::aim::{Aim, Choice, NoAim, Situation, Standing};
 use crate::association::history::History;
@@ -140,6 +142,8 @@ pub struct Localizer<'m> {
     gyro: Option<GyroFusion>,
     /// The latest step of the odometry.
     step: LastStep,
+    /// Where the latest steps have led.
+    path: Path,
     /// The sources of absolute measurements.
     sources: Sources,
 }
@@ -204,6 +208,7 @@ impl<'m> Localizer<'m> {
             association: 0.0,
             gyro,
             step: LastStep::none(now),
+            path: Path::default(),
             sources: Sources::new(now),
         })
     }
@@ -251,6 +256,7 @@ impl<'m> Localizer<'m> {
         self.health = Health::default();
         self.history = History::default();
         self.step = LastStep::none(self.time);
+        self.path = Path::default();
         self.sources = Sources::new(self.time);
         self.pose_changed();
     }

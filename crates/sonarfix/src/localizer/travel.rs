@@ -3,12 +3,14 @@
 //! # Non-finite policy
 //! That of the [localizer](super).
 
+use super::passage::Path;
 use super::unseen::Unseen;
 use super::{Localizer, NO_TIME};
 use crate::filter::ekf::EkfError;
 use crate::filter::motion::WheelTravel;
 use crate::filter::odometry::{self, OdometryError};
 use crate::geometry::units::{Duration, Instant, Radians, seconds};
+use crate::geometry::vector::Vector;
 use crate::sensor::absolute::{LastStep, PoseVector, Sources};
 use crate::sensor::gyro::MeasuredTurn;
 
@@ -52,12 +54,16 @@ impl Localizer<'_> {
         let (before, is_seen) = (self.ekf.estimate(), self.unseen.is_none());
         self.predict_seen(now, travel, elapsed, turn).map_err(OdometryError::Filter)?;
         let (x, y, h) = self.ekf.estimate().pose_since(&before);
-        // The path of a period without odometry is unknown.
-        self.step = if is_seen {
-            LastStep::new(self.time, PoseVector { x, y, h })
+        if is_seen {
+            self.step = LastStep::new(self.time, PoseVector { x, y, h });
+            if self.path.passes(Vector::new(x, y), &self.ekf, &self.map) {
+                self.health.record_passage();
+            }
         } else {
-            LastStep::none(now)
-        };
+            // The path of a period without odometry is unknown.
+            self.step = LastStep::none(now);
+            self.path = Path::default();
+        }
         self.history.record_turn(Radians(h), seconds(elapsed));
         self.history.record_distance(travel.distance());
         (self.time, self.recorded) = (now, now);
