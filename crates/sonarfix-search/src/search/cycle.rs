@@ -120,10 +120,8 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         if usize::from(line) + 1 < self.lines.all().len() {
             Task::Fit { line: line + 1 }
         } else {
-            {
-                self.bank.begin_refinement();
-                Task::Bank
-            }
+            self.bank.begin_refinement();
+            Task::Bank
         }
     }
 
