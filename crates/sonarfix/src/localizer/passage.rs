@@ -26,8 +26,7 @@ pub(super) struct Path {
 
 impl Path {
     // ===== Eq. (59): passage through a wall =====
-    /// Adds a step that has led to the estimate of a filter. Returns whether the path has led through a wall of the map; it is forgotten
-    /// then.
+    /// Adds a step that has led to the estimate of a filter. Returns whether the path has led through a wall of the map.
     #[inline]
     pub fn passes(&mut self, step: Vector, ekf: &Ekf, map: &Map<'_>) -> bool {
         let Some(latest) = self.parts.first_mut() else { return false };
@@ -45,11 +44,10 @@ impl Path {
         let is_passed = map
             .near(at.into(), Metres(4.0 * length))
             .any(|(_, wall)| self.leads_through(&wall, at, length, &p));
-        if is_passed || latest >= length_squared {
+        if latest >= length_squared {
             let mut before = Vector::default();
             for part in &mut self.parts {
-                let complete = core::mem::replace(part, before);
-                before = if is_passed { Vector::default() } else { complete };
+                before = core::mem::replace(part, before);
             }
         }
         is_passed

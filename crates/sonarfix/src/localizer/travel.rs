@@ -11,6 +11,7 @@ use crate::filter::motion::WheelTravel;
 use crate::filter::odometry::{self, OdometryError};
 use crate::geometry::units::{Duration, Instant, Radians, seconds};
 use crate::geometry::vector::Vector;
+use crate::health::Verdict;
 use crate::sensor::absolute::{LastStep, PoseVector, Sources};
 use crate::sensor::gyro::MeasuredTurn;
 
@@ -54,15 +55,16 @@ impl Localizer<'_> {
         let (before, is_seen) = (self.ekf.estimate(), self.unseen.is_none());
         self.predict_seen(now, travel, elapsed, turn).map_err(OdometryError::Filter)?;
         let (x, y, h) = self.ekf.estimate().pose_since(&before);
-        if is_seen {
-            self.step = LastStep::new(self.time, PoseVector { x, y, h });
-            if self.path.passes(Vector::new(x, y), &self.ekf, &self.map) {
-                self.health.record_passage();
-            }
+        self.step = if is_seen {
+            LastStep::new(self.time, PoseVector { x, y, h })
         } else {
-            // The path of a period without odometry is unknown.
-            self.step = LastStep::none(now);
+            LastStep::none(now)
+        };
+        // The path of a period without odometry is unknown, and that of a lost robot does not matter.
+        if !is_seen || self.health.verdict == Verdict::Lost {
             self.path = Path::default();
+        } else if self.path.passes(Vector::new(x, y), &self.ekf, &self.map) {
+            self.health.record_passage();
         }
         self.history.record_turn(Radians(h), seconds(elapsed));
         self.history.record_distance(travel.distance());
