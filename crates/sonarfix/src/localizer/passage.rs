@@ -8,11 +8,10 @@ use crate::geometry::units::Metres;
 use crate::geometry::vector::Vector;
 use crate::map::{Map, Wall};
 
-/// Parts of the path that are known. A program that does not explain echoes by other walls
-/// than the one in view does not test it.
-const PARTS: usize = if cfg!(feature = "reflectors") { 4 } else { 0 };
-/// So many deviations of the position have to be between both ends and a wall that was passed. The centre of a robot stays away from a
-/// wall by half its width, in addition. Chosen on the recordings `seattle`, `freiburg-079` and `ex3_guy`, and on rooms with the seeds
+/// Parts of the path that are known. A program that does not explain echoes by other walls than the one in view knows none.
+const PARTS: u8 = if cfg!(feature = "reflectors") { 4 } else { 0 };
+/// So many deviations of the position have to be between both ends and a wall that was passed; a part is as long. The centre of a robot
+/// stays away from a wall by half its width, in addition. Chosen on the recordings `seattle`, `freiburg-079` and `ex3_guy`, and on rooms with the seeds
 /// 200000 to 200011.
 const DEVIATIONS: f32 = 2.5;
 /// The least distance between an end and the wall, and the least length of a part, metres.
@@ -21,28 +20,29 @@ const LEAST: f32 = 0.05;
 /// The latest path, as the filter predicted it: displacements in the map frame, the latest first.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Path {
-    parts: [Vector; PARTS],
+    parts: [Vector; PARTS as usize],
 }
 
 impl Path {
     // ===== Eq. (59): passage through a wall =====
     /// Adds a step that has led to the estimate of a filter. Returns whether the path has led through a wall of the map.
     #[inline]
-    pub fn passes(&mut self, step: Vector, ekf: &Ekf, map: &Map<'_>) -> bool {
+    pub fn extend(&mut self, step: Vector, ekf: &Ekf, map: &Map<'_>) -> bool {
         let Some(latest) = self.parts.first_mut() else { return false };
         *latest = latest.plus(step);
         let length_squared = latest.length_squared();
-        self.extend(length_squared, ekf, map)
+        self.test(length_squared, ekf, map)
     }
 
+    /// Tests the path, and begins another part if the square of the length of the latest one is `latest`, and that is enough.
     #[inline(never)]
-    fn extend(&mut self, latest: f32, ekf: &Ekf, map: &Map<'_>) -> bool {
+    fn test(&mut self, latest: f32, ekf: &Ekf, map: &Map<'_>) -> bool {
         let (estimate, p) = (ekf.estimate(), ekf.pose_covariance());
         let at = Vector::new(estimate.x, estimate.y);
         let length_squared = limit(p.xx + p.yy);
         let length = libm::sqrtf(length_squared);
         let is_passed = map
-            .near(at.into(), Metres(4.0 * length))
+            .near(at.into(), Metres(f32::from(PARTS) * length))
             .any(|(_, wall)| self.leads_through(&wall, at, length, &p));
         if latest >= length_squared {
             let mut before = Vector::default();

@@ -18,7 +18,8 @@ use crate::sensor::gyro::MeasuredTurn;
 impl Localizer<'_> {
     /// Predicts the estimate over the travel of both wheels since the last call, up to the time `now`.
     ///
-    /// To be called at every encoder sample, and at the instant when an echo left the wall.
+    /// To be called at every encoder sample, and at the instant when an echo left the wall. If the path has led through a wall of the map,
+    /// the verdict is `Lost` (`docs/model.md`, eq. 59).
     ///
     /// # Errors
     /// [`OdometryError`], by what is wrong with the travel or its time; estimate and time are unchanged.
@@ -63,7 +64,7 @@ impl Localizer<'_> {
         // The path of a period without odometry is unknown, and that of a lost robot does not matter.
         if !is_seen || self.health.verdict == Verdict::Lost {
             self.path = Path::default();
-        } else if self.path.passes(Vector::new(x, y), &self.ekf, &self.map) {
+        } else if self.path.extend(Vector::new(x, y), &self.ekf, &self.map) {
             self.health.record_passage();
         }
         self.history.record_turn(Radians(h), seconds(elapsed));

@@ -45,6 +45,10 @@ impl<'a> Drive<'a> {
     }
 }
 
+fn start(pose: Pose, deviation: f32) -> Start {
+    Start { pose, position_deviation: Metres(deviation), heading_deviation: Radians(0.01) }
+}
+
 /// A wall of 3 m through the origin, in a direction.
 fn wall(direction: f32) -> [Wall; 1] {
     let (sin, cos) = (libm::sinf(direction), libm::cosf(direction));
@@ -78,7 +82,7 @@ proptest! {
     fn a_path_before_beside_and_around_a_wall_leads_not_through_it(
         direction in -3.0_f32..3.0,
         beside in 0.06_f32..0.4,
-        radius in 0.08_f32..0.3,
+        steps in 13_u8..50,
         deviation in 0.002_f32..0.1,
     ) {
         let walls = wall(direction);
@@ -87,12 +91,15 @@ proptest! {
         let mut drive = Drive::new(&walls, pose(direction, 0.0, -beside - 0.8, square), deviation);
         prop_assert_eq!(drive.ahead(0.78, 0.0), None);
         // Along it, then around its end, and back along the other side.
+        let half_circle = f32::from(steps) * STEP;
+        let radius = half_circle / core::f32::consts::PI;
         let mut drive = Drive::new(&walls, pose(direction, 0.5, -radius, 0.0), deviation);
         prop_assert_eq!(drive.ahead(1.0 + 0.5 * radius, 0.0), None);
-        let half_circle = core::f32::consts::PI * radius;
-        prop_assert_eq!(drive.ahead(half_circle, 1.0 / radius), None);
+        prop_assert_eq!(drive.ahead(half_circle - 0.5 * STEP, 1.0 / radius), None);
         prop_assert_eq!(drive.ahead(1.0, 0.0), None);
-        prop_assert!(drive.localizer.pose().position().x.0.is_finite());
+        let beside = walls[0].signed_distance(drive.localizer.pose().position());
+        let before = walls[0].signed_distance(pose(direction, 0.5, -radius, 0.0).position());
+        prop_assert!(beside.0 * before.0 < 0.0, "it is on the other side: {beside:?}, {before:?}");
     }
 }
 
@@ -114,6 +121,18 @@ fn a_path_whose_end_may_be_on_the_same_side_leads_not_through_a_wall() {
         assert_eq!(drive.ahead(before + 0.08, 0.0), None, "from {before} m before it");
         let mut drive = Drive::new(&walls, pose(0.0, 0.0, 0.1, -1.57), 0.05);
         assert_eq!(drive.ahead(0.1 + before, 0.0), None, "to {before} m before it");
+    }
+}
+
+#[test]
+fn a_new_pose_begins_a_new_path() {
+    let walls = wall(0.0);
+    let mut drive = Drive::new(&walls, pose(0.0, 0.0, -0.5, 1.57), 0.005);
+    assert!(drive.ahead(1.0, 0.0).is_some());
+    for beside in [-0.5, 0.1] {
+        let start = start(pose(0.0, 0.0, beside, 1.57), 0.005);
+        drive.localizer.set_pose(&start).unwrap();
+        assert_eq!(drive.ahead(0.4, 0.0), None, "from {beside} m");
     }
 }
 
