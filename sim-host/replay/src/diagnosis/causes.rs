@@ -30,6 +30,8 @@ pub enum Cause {
     TravelUnit,
     /// The track width is another.
     TrackWidth,
+    /// The wheels are noisier.
+    WheelNoise,
     /// The servo turns the other way.
     BearingMirrored,
     /// The zero of the servo is another.
@@ -123,7 +125,7 @@ const WIDTHS: &[f64] = &[
     0.1, 0.2, 0.25, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 1.13, 1.25, 1.4, 1.6, 1.8, 2.0, 2.3, 4.0, 10.0,
 ];
 
-const VARIED: [Varied; 16] = [
+const VARIED: [Varied; 17] = [
     Varied {
         cause: Cause::RightTravel,
         values: FACTORS,
@@ -151,6 +153,13 @@ const VARIED: [Varied; 16] = [
         half_step: 1.06,
         is_factor: true,
         change: |by| Change { track_width: by, ..Change::default() },
+    },
+    Varied {
+        cause: Cause::WheelNoise,
+        values: &[2.5, 4.0, 6.0, 10.0, 16.0],
+        half_step: 1.27,
+        is_factor: true,
+        change: |by| Change { wheel_noise: by, ..Change::default() },
     },
     Varied {
         cause: Cause::BearingOffset,
@@ -504,6 +513,8 @@ impl Candidate {
                 let slower = (-self.value.ln()).max(0.0);
                 5.0 + 40.0 * self.value.ln().abs() + 40.0 * slower.powi(2)
             }
+            // The prior of the noise that a builder states: by a factor of 3.
+            Cause::WheelNoise => 5.0 + unusual(self.value.ln(), 1.1),
             Cause::TrackWidth => 5.0 + 20.0 * self.value.ln().abs(),
             Cause::RangeScale => 5.0 + unusual(self.value.ln(), 0.15),
             // A mount that was measured wrongly is more frequent than a ranger with an offset.
@@ -528,6 +539,8 @@ impl Candidate {
                 let prior = 3.0 * f64::from(prior.track_width.0) / width;
                 (self.value - 1.0, prior.min(MEASURED))
             }
+            // The filter adapts to twice the noise.
+            Cause::WheelNoise => (self.value, 2.0),
             Cause::BearingOffset => (self.value, 6.0),
             Cause::StartHeading => {
                 let expected = 4.0 * of_heading.unwrap_or(0.0).to_degrees();

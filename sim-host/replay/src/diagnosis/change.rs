@@ -32,6 +32,8 @@ pub struct Change {
     /// Of the travel of the right and of the left wheel; negative for a mirrored encoder.
     pub wheels: [f64; 2],
     pub track_width: f64,
+    /// Factor of the wheels' noise.
+    pub wheel_noise: f64,
     /// Factor of the bearings of the sonar; −1 for a mirrored servo.
     pub bearing: f64,
     /// Added to the bearings, radians.
@@ -71,6 +73,7 @@ impl Default for Change {
             is_swapped: false,
             wheels: [1.0; 2],
             track_width: 1.0,
+            wheel_noise: 1.0,
             bearing: 1.0,
             bearing_offset: 0.0,
             range: 1.0,
@@ -97,6 +100,8 @@ impl Change {
         let mut changed = *robot;
         let width = &mut changed.localizer.drive.track_width;
         *width = single(f64::from(width.0) * self.track_width, Metres);
+        let noise = &mut changed.localizer.drive.wheel_noise.0.0;
+        *noise = single(f64::from(*noise) * self.wheel_noise, |noise| noise);
         // A wheel that is slower than its counts is no more accurate than they are.
         let by = 0.5 * self.wheels.iter().map(|by| by.abs()).sum::<f64>();
         if (LEAST_TRAVEL..1.0).contains(&by) {

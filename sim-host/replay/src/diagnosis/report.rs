@@ -73,6 +73,17 @@ fn wheels(candidate: &Candidate, robot: &RobotConfig) -> Option<Words> {
                 travel("left_wheel", f64::from(robot.left_wheel.travel_per_edge.0), value)
             ),
         ),
+        Cause::WheelNoise => {
+            let noise = 1e3 * f64::from(robot.localizer.drive.wheel_noise.0.0);
+            (
+                "wheel_noise",
+                format!("the travel of the wheels is {factor} as inaccurate as the robot file states"),
+                format!(
+                    "drive.wheel_noise = \"{:.1} mm/sqrt(m)\" instead of \"{noise:.1} mm/sqrt(m)\"; `sonarfix calibrate` estimates it",
+                    noise * value
+                ),
+            )
+        }
         Cause::TrackWidth => {
             let width = 1e3 * f64::from(robot.localizer.drive.track_width.0);
             (
