@@ -181,10 +181,10 @@ impl<'a> Trial<'a> {
         Evidence::of(&change.robot(self.robot), &walls, records.into_iter(), change.range)
     }
 
-    fn try_one(&self, candidate: Candidate, as_is: &Evidence) -> Option<Tried> {
+    fn try_one(&self, candidate: &Candidate, as_is: &Evidence) -> Option<Tried> {
         let evidence = self.of(&candidate.change)?;
         let gain = evidence.gain(as_is);
-        Some(Tried { candidate, evidence, gain })
+        Some(Tried { candidate: *candidate, evidence, gain })
     }
 
     /// The files and the log as they are.
@@ -229,7 +229,7 @@ impl<'a> Trial<'a> {
         let mut tried: Vec<_> = self
             .screened(candidates)
             .into_iter()
-            .filter_map(|it| self.try_one(it, as_is))
+            .filter_map(|it| self.try_one(&it, as_is))
             .collect();
         keep_best(&mut tried, 0);
         // The search takes seconds, and a wrong start explains little.
@@ -282,7 +282,7 @@ impl<'a> Trial<'a> {
     fn refine(&self, best: &mut Tried, as_is: &Evidence) {
         for fineness in 0..REFINEMENTS {
             for candidate in causes::finer(&best.candidate, fineness) {
-                if let Some(tried) = self.try_one(candidate, as_is)
+                if let Some(tried) = self.try_one(&candidate, as_is)
                     && tried.gain > best.gain
                 {
                     *best = tried;
@@ -319,7 +319,7 @@ impl<'a> Trial<'a> {
         let entries = self.entries.get(..SCREENED).unwrap_or(self.entries);
         let first = Trial { entries, ..*self };
         let as_is = first.as_is();
-        let tried = candidates.into_iter().filter_map(|it| first.try_one(it, &as_is));
+        let tried = candidates.into_iter().filter_map(|it| first.try_one(&it, &as_is));
         let mut tried = tried.collect();
         keep_best(&mut tried, KEPT);
         tried.into_iter().map(|it| it.candidate).collect()
@@ -335,7 +335,7 @@ impl<'a> Trial<'a> {
         let time = self.begin() + broken.from;
         let mut tried = self.searched(time, as_is, |pose| causes::moved_to(time, pose));
         let around = broken.pose.into_iter().flat_map(|pose| causes::moves_around(time, pose));
-        tried.extend(around.filter_map(|it| self.try_one(it, as_is)));
+        tried.extend(around.filter_map(|it| self.try_one(&it, as_is)));
         keep_best(&mut tried, REFINED);
         for best in &mut tried {
             self.refine(best, as_is);
@@ -355,7 +355,7 @@ impl<'a> Trial<'a> {
         let mut tried = Vec::new();
         for seconds in SEARCHED.into_iter().filter(|it| *it <= longest) {
             let poses = self.found(from, seconds).into_iter();
-            tried.extend(poses.filter_map(|pose| self.try_one(candidate(pose), as_is)));
+            tried.extend(poses.filter_map(|pose| self.try_one(&candidate(pose), as_is)));
             if tried.iter().any(|it| it.is_enough(as_is) && it.evidence.explained() >= RIGHT) {
                 break;
             }
