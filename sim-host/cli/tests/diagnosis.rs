@@ -63,6 +63,13 @@ fn causes(dir: &Path) -> Vec<String> {
     findings.iter().map(cause).collect()
 }
 
+/// What `replay` prints of a log.
+fn replayed(log: &Path) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+    let output = command.arg("replay").arg(log).output().unwrap();
+    String::from_utf8(output.stdout).unwrap()
+}
+
 /// A change of the numbers of a record behind its kind; the first one is its time.
 type Change = fn(&mut [f64]);
 
@@ -220,9 +227,7 @@ fn noisy(log: &str, deviation: f64, seed: u64) -> String {
 
 /// The noise of the wheels that the first cause states, metres per root metre.
 fn named_noise(log: &Path) -> Option<f64> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
-    let output = command.arg("replay").arg(log).output().unwrap();
-    let printed = String::from_utf8(output.stdout).unwrap();
+    let printed = replayed(log);
     let first = printed.split("probable cause: ").nth(1)?;
     let found = first.split("drive.wheel_noise = \"").nth(1)?;
     Some(1e-3 * found.split(' ').next().unwrap().parse::<f64>().unwrap())
@@ -307,9 +312,7 @@ fn a_finding_states_its_line_and_the_remedy() {
     let right = fs::read_to_string(&log).unwrap();
     let turned = changed(&right, "resume", |it| it[3] += 1.6);
     fs::write(&log, turned).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
-    let output = command.arg("replay").arg(&log).output().unwrap();
-    let printed = String::from_utf8_lossy(&output.stdout);
+    let printed = replayed(&log);
     let found =
         printed.split("probable cause: line 2: the heading at the start is wrong by ").nth(1);
     let degrees: f64 = found.unwrap().split(' ').next().unwrap().parse().unwrap();
