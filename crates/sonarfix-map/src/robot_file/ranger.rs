@@ -53,7 +53,7 @@ pub(crate) static RANGER: Section<RangerKeys> = Section { name: "ranger", usual:
 
 #[rustfmt::skip]
 pub(crate) static BEAM: Section<LightBeam> = Section { name: "beam", usual: || LightBeam::VL53L1X, keys: &[
-    depends(number("spot", &ANGLE, ("0.01 deg", "20 deg"), |b| &mut b.spot.0, "half of the cone that it lights")),
+    depends(number("spot", &ANGLE, ("0.01 deg", "20 deg"), |b| &mut b.spot.0, "half of the inner cone, which returns most of the light: a quarter of the field of view")),
     depends(number("pointing", &ANGLE, ("0 deg", "45 deg"), |b| &mut b.pointing.0,
         "standard deviation of its direction: of servo and mount")),
 ] };

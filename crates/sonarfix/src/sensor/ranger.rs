@@ -39,7 +39,8 @@ pub enum LightLinked {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LightBeam {
-    /// Half of the angle of the cone that it lights. A wall is measured if the whole spot is on it.
+    /// Half of the angle of the inner cone that returns most of the light. A wall is measured if the whole field of view, which is
+    /// twice as wide, is on it.
     pub spot: Radians,
     /// Standard deviation of the direction of the beam: of the servo, the mount and the spot's centre.
     pub pointing: Radians,

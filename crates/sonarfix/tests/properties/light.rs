@@ -266,13 +266,13 @@ fn through_a_door_the_wall_behind_it_is_measured() {
     assert!(matches!(localizer.fix(&aim, Some(Metres(2.5))), Fix::Accepted(_)));
 }
 
-/// The beam passes 2 cm beside the frame of the door: the wall behind it explains the range, which is no evidence
+/// The field of view ends 2 cm beside the frame of the door: the wall behind it explains the range, which is no evidence
 /// against the pose. Without that wall it is.
 #[test]
 fn the_wall_behind_a_door_explains_a_range_at_its_edge() {
     let mut config = config_with_light(Point::default());
     config.echo.free_path = Metres(10.0);
-    let with_room = at_a_door(0.10);
+    let with_room = at_a_door(0.26);
     let start = start_at(Pose::new(0.0, 0.0, Radians(0.0)));
     let evidence = |walls: &[Wall]| {
         let mut localizer =
@@ -286,6 +286,20 @@ fn the_wall_behind_a_door_explains_a_range_at_its_edge() {
     };
     let (with, without) = (evidence(&with_room), evidence(&with_room[..2]));
     assert!(with < without - 0.3, "{with} {without}");
+}
+
+/// Half of the field of view is 24 cm at the wall, which is 1 m ahead.
+#[test]
+fn a_wall_is_measured_if_the_whole_field_of_view_is_on_it() {
+    let start = start_at(Pose::new(0.0, 0.0, Radians(0.0)));
+    for (aside, is_measured) in [(0.10, false), (0.26, true)] {
+        let walls = at_a_door(aside);
+        let config = config_with_light(Point::default());
+        let localizer =
+            Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(0)).unwrap();
+        let aim = localizer.aim_at(Radians(0.0));
+        assert_eq!(aim.is_ok_and(|aim| aim.wall.0 == 0), is_measured, "{aside} m");
+    }
 }
 
 #[test]

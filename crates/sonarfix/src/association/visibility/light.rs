@@ -13,6 +13,9 @@ use crate::geometry::vector::Vector;
 use crate::map::Wall;
 use crate::sensor::range::ExpectedRange;
 
+/// Half of the field of view over half of the spot, the inner half that returns most of the light.
+const FIELD: f32 = 2.0;
+
 /// Where a beam meets a wall.
 pub(crate) struct Spot {
     pub expected: ExpectedRange,
@@ -75,11 +78,11 @@ impl Viewpoint<'_> {
         let aside = |point| Vector::from(point).minus(self.position().into()).dot(axis.left());
         let (from, to) = (aside(wall.from()), aside(wall.to()));
         let (right, left) = if from < to { (from, to) } else { (to, from) };
-        let swept = distance * distance;
-        let variance = self.variance(-axis.y, axis.x)
-            + swept * (turn + beam.spot.0 * beam.spot.0)
-            + FOOT_MARGIN * FOOT_MARGIN;
-        let on_wall = probability_within(-right, left, variance);
+        let variance =
+            self.variance(-axis.y, axis.x) + distance * distance * turn + FOOT_MARGIN * FOOT_MARGIN;
+        // The mean of a field of view that another wall shares is not the range of this one.
+        let field = FIELD * beam.spot.0 * distance;
+        let on_wall = probability_within(-right - field, left - field, variance);
         let away = Vector::new(met.by_x, met.by_y);
         // Derivative by the bearing, and the tangent of the incidence.
         let by_bearing = distance * away.dot(axis.left());
