@@ -16,6 +16,15 @@ pub const NXT_ECHO: EchoParameters = {
     nxt
 };
 
+/// LEGO EV3: it reports the nearest point of a cone of ±15°, which up to there is the foot of the perpendicular, so that no echo is
+/// late. The angles are those of the NXT, and the shares its averages over all ranges, because those of the EV3 are not known.
+pub const EV3_ECHO: EchoParameters = {
+    let mut ev3 = echo(0.08, 0.04, 0.03);
+    (ev3.late.0, ev3.late_per_radian.0) = (0.0, 0.0);
+    (ev3.half_angle, ev3.rim) = (NXT_ECHO.half_angle, NXT_ECHO.rim);
+    ev3
+};
+
 /// Devantech SRF08: assumed like the HC-SR04.
 pub const SRF08_ECHO: EchoParameters = EchoParameters::HC_SR04;
 

@@ -5,8 +5,8 @@ use sonarfix::sensor::echo::EchoParameters;
 use sonarfix_hal::ranger::RangerSettings;
 
 use crate::devices::{
-    LV_MAXSONAR_ECHO, NXT_ECHO, POLAROID_6500_ECHO, SRF08_ECHO, VL53L0X_BEAM, VL53L0X_ECHO,
-    VL53L1X_ECHO,
+    EV3_ECHO, LV_MAXSONAR_ECHO, NXT_ECHO, POLAROID_6500_ECHO, SRF08_ECHO, VL53L0X_BEAM,
+    VL53L0X_ECHO, VL53L1X_ECHO,
 };
 use crate::document::Node;
 use crate::spelling::alternatives;
@@ -25,6 +25,8 @@ pub enum SonarName {
     HcSr04,
     /// LEGO NXT.
     Nxt,
+    /// LEGO EV3, which reports the nearest point of its cone.
+    Ev3,
     /// LV-MaxSonar-EZ, by pulse width.
     LvMaxSonar,
     /// SRF08.
@@ -54,7 +56,7 @@ pub struct SonarModel {
 
 impl SonarModel {
     /// All sonars.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self {
             name: "ideal",
             simulated: Some(SonarName::Ideal),
@@ -74,6 +76,13 @@ impl SonarModel {
             simulated: Some(SonarName::Nxt),
             ranger: None,
             echo: Some(NXT_ECHO),
+            beam: None,
+        },
+        Self {
+            name: "ev3",
+            simulated: Some(SonarName::Ev3),
+            ranger: None,
+            echo: Some(EV3_ECHO),
             beam: None,
         },
         Self {

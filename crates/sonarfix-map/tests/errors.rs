@@ -445,7 +445,7 @@ const HARDWARE: [Case; 12] = [
         "[sensor]\nmodel = \"srf99\"\n[run]",
         "model = ",
         "sensor.model",
-        "must be \"ideal\", \"hc_sr04\", \"nxt\", \"lv_maxsonar\", \"srf08\", \"polaroid_6500\", \"vl53l1x\" or \"vl53l0x\"",
+        "must be \"ideal\", \"hc_sr04\", \"nxt\", \"ev3\", \"lv_maxsonar\", \"srf08\", \"polaroid_6500\", \"vl53l1x\" or \"vl53l0x\"",
     ),
     case("[run]", "[servo]\nmodle = 1\n[run]", "modle = ", "servo.modle", "unknown key"),
     case(

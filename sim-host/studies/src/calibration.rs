@@ -238,8 +238,7 @@ impl Simulated {
             scenario.upsets = Upsets::default();
         }
         let track_width = scenario.truth.track_width;
-        let (Drive { mut recording, .. }, simulation) =
-            drive(scenario, robot, sensor.and_then(Sensor::simulated), seed)?;
+        let (Drive { mut recording, .. }, simulation) = drive(scenario, robot, seed)?;
         recording.cut(metres);
         let floor = simulation.scenario.floor.named_walls();
         let walls: Vec<Wall> =

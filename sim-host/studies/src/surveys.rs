@@ -142,7 +142,7 @@ fn driven(
         there_and_back(&mut scenario);
     }
     let robot = scenario.robot;
-    let (mut driven, simulation) = drive(scenario, robot, None, seed)?;
+    let (mut driven, simulation) = drive(scenario, robot, seed)?;
     if place == Place::Plans {
         driven.recording.readings.retain(|reading| reading.time <= PLAN_SECONDS);
         let end = driven.recording.readings.last().map_or(0.0, |reading| reading.time);

@@ -11,7 +11,6 @@ use sonarfix_hal::robot::{Report, Step, StepResult};
 use sonarfix_map::Scenario;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::trace::{FixRecord, Pose, Recorder, Tick};
-use sonarfix_sim::world::sensor::SensorModel;
 
 /// What a drive left: the recording, and the true poses.
 #[derive(Debug, Clone, Default)]
@@ -23,7 +22,7 @@ pub struct Drive {
 }
 
 /// Drives along the scenario's path. The software is configured as `robot`, whose mount and servo may differ from those
-/// of the scenario's robot, and its sensor from that of the scenario. It has no map and no pose: its map is one wall far away, so long that
+/// of the scenario's robot. It has no map and no pose: its map is one wall far away, so long that
 /// no place along it is unique, so that it sweeps all the time.
 ///
 /// # Errors
@@ -31,7 +30,6 @@ pub struct Drive {
 pub fn drive(
     mut scenario: Scenario,
     mut robot: RobotConfig,
-    sensor: Option<SensorModel>,
     seed: u64,
 ) -> Result<(Drive, Simulation), SimulationError> {
     const FAR: f32 = 9_000.0;
@@ -41,10 +39,6 @@ pub fn drive(
     let begin = scenario.path.pose_at(0.0);
     let far = Wall::new(Point::new(FAR, 0.0), Point::new(FAR, FAR)).into_iter().collect();
     let simulation = Simulation::new(scenario).believing(robot, far);
-    let simulation = match sensor {
-        Some(sensor) => simulation.heard_by(sensor),
-        None => simulation,
-    };
     let mut recorder = Sweeps::default();
     simulation.run(seed, &mut recorder)?;
     let mut drive = recorder.drive;
@@ -121,7 +115,7 @@ mod tests {
         for seed in 0..2 {
             let scenario = FloorPlan::new(seed).scenario()?;
             let robot = scenario.robot;
-            let pings = drive(scenario, robot, None, seed)?.0.recording.pings;
+            let pings = drive(scenario, robot, seed)?.0.recording.pings;
             let end = pings.last().map_or(0.0, |ping| ping.time);
             let period = end / pings.len() as f64;
             assert!((period / PERIOD - 1.0).abs() < 0.05, "{period} s");

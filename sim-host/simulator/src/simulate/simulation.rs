@@ -130,13 +130,6 @@ impl Simulation {
         Self { assumed: Some(robot), walls, image, ..self }
     }
 
-    /// The same with another true sonar than the scenario's.
-    #[must_use]
-    pub fn heard_by(self, sensor: SensorModel) -> Self {
-        let SensorModel { scale, offset, .. } = self.sensor;
-        Self { sensor: SensorModel { scale, offset, ..sensor }, ..self }
-    }
-
     /// The same with other unmapped obstacles from a time on, seconds since the run began.
     #[must_use]
     pub fn rearranged(self, from: f64, obstacles: &[sonarfix_map::Obstacle]) -> Self {
@@ -364,6 +357,7 @@ fn sensor(scenario: &Scenario) -> SensorModel {
         SonarName::Ideal => SensorModel::ideal(scenario),
         SonarName::HcSr04 => SensorModel::hc_sr04(),
         SonarName::Nxt => SensorModel::nxt(),
+        SonarName::Ev3 => SensorModel::ev3(),
         SonarName::LvMaxSonar => SensorModel::lv_maxsonar(),
         SonarName::Srf08 => SensorModel::srf08(),
         SonarName::Polaroid6500 => SensorModel::polaroid_6500(),

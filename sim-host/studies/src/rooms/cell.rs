@@ -60,8 +60,7 @@ impl Cell {
         Ok(Sums::of(&result, &watch))
     }
 
-    /// The run of a seed as a scenario. It lacks what a scenario cannot say: another map than the walls, obstacles that change, and the
-    /// simulation of an EV3 sensor.
+    /// The run of a seed as a scenario. It lacks what a scenario cannot say: another map than the walls, and obstacles that change.
     #[must_use]
     pub fn toml(&self, seed: u64) -> String {
         let (room, scene, mut rng) = self.scene(seed);
@@ -94,10 +93,7 @@ impl Cell {
         if let Some((from, obstacles)) = &scene.later {
             simulation = simulation.rearranged(*from, obstacles);
         }
-        Ok(match self.sensor.simulated() {
-            Some(sensor) => simulation.heard_by(sensor),
-            None => simulation,
-        })
+        Ok(simulation)
     }
 }
 

@@ -1,6 +1,4 @@
-//! The sensors of the study: the tables of the robot's file, and what is simulated.
-
-use sonarfix_sim::world::sensor::SensorModel;
+//! The sensors of the study: the tables of the robot's file.
 
 /// A sensor on the robot's servo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,10 +41,5 @@ impl Sensor {
             Self::LvMaxSonar => include_str!("sensors/lv_maxsonar.toml"),
             Self::Vl53l1x => include_str!("sensors/vl53l1x.toml"),
         }
-    }
-
-    /// Its simulation, where scenarios have no name for it.
-    pub(crate) fn simulated(self) -> Option<SensorModel> {
-        (self == Self::Ev3).then(SensorModel::ev3)
     }
 }
