@@ -220,7 +220,7 @@ pub(super) static RULES: &[Rule] = &[
     Rule::new("sonar.ranger.longest", "the longest echo pulse", &TIME, ("2 ms", "200 ms"), "an echo from 4 m takes 23 ms"),
     Rule::new("sonar.ranger.silence", "the pulse without an echo", &TIME, ("2 ms", "500 ms"), "HC-SR04: 38 ms to 200 ms"),
     Rule::new("sonar.ranger.listen", "the time after which a ranger does not answer", &TIME, ("2 ms", "1 s"), HARDWARE),
-    Rule::new("sonar.beam.spot", "half of the cone of light", &ANGLE, ("0.1 deg", "15 deg"), "VL53L1X: 13.5°"),
+    Rule::new("sonar.beam.spot", "half of the inner cone of light", &ANGLE, ("0.1 deg", "15 deg"), "VL53L1X: 6.9°, a quarter of its 27°"),
     // Prior and filter.
     Rule::new("prior.scale_right", "the deviation of a wheel's scale", &FRACTION, ("0.02 %", "15 %"), "a calliper measures a wheel to 1 %").or_zero().because(&[FRACTION_OF_ONE, PERCENT]),
     Rule::new("prior.scale_left", "the deviation of a wheel's scale", &FRACTION, ("0.02 %", "15 %"), "a calliper measures a wheel to 1 %").or_zero().because(&[FRACTION_OF_ONE, PERCENT]),

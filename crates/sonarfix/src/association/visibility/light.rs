@@ -13,7 +13,7 @@ use crate::geometry::vector::Vector;
 use crate::map::Wall;
 use crate::sensor::range::ExpectedRange;
 
-/// Half of the field of view over half of the spot, the inner half that returns most of the light.
+/// The field of view over its inner half, the spot, which returns most of the light.
 const FIELD: f32 = 2.0;
 
 /// Where a beam meets a wall.
