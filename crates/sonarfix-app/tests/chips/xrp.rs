@@ -16,7 +16,7 @@ use crate::{done, image, map_of, segments, start};
 /// The arena that `sonarfix init --board xrp` writes.
 const CORNERS: [(f32, f32); 7] =
     [(0.0, 0.0), (1.8, 0.0), (1.8, 1.2), (0.5, 1.2), (0.5, 0.8), (0.0, 0.8), (0.0, 0.0)];
-const POSE: [f32; 3] = [0.5, 0.5, 0.0];
+const POSE: [f32; 3] = [1.1, 0.35, 0.0];
 /// A circle of 0.25 m, which stays within the arena.
 const MOTION: Motion = Motion { speed: MetresPerSecond(0.12), turn: RadiansPerSecond(0.48) };
 
