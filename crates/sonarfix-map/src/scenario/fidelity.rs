@@ -39,7 +39,7 @@ pub struct Hardware {
 pub(crate) static SENSOR: Section<SonarName> = Section { name: "sensor", usual: SonarName::default, keys: &[
     optional(Key::new("model", Value::Own("a simulation of the list above", |node, sonar| read_sensor(&node, sonar), |_| None),
         "the simulated sonar. `\"ideal\"`, which is usual, always detects the nearest wall in its cone; `\"hc_sr04\"` and `\"nxt\"` are as measured ([the \
-        fit](sonar-model.md)), the others by their datasheets")),
+        fit](sonar-model.md)), `\"ev3\"` has [the cone of a recorded drive](hardware.md#ultrasonic-rangers), the others are by their datasheets")),
 ] };
 
 #[rustfmt::skip]

@@ -23,11 +23,8 @@ impl<'a> Drive<'a> {
     fn new(walls: &'a [Wall], pose: Pose, deviation: f32) -> Self {
         let config = Config::for_track_width(Metres(TRACK));
         let now = Instant::from_ticks(0);
-        Self {
-            localizer: Localizer::new(config, Map::new(walls), start(pose, deviation), now)
-                .unwrap(),
-            ticks: 0,
-        }
+        let start = start(pose, deviation);
+        Self { localizer: Localizer::new(config, Map::new(walls), start, now).unwrap(), ticks: 0 }
     }
 
     /// Drives so far in steps, to the left by `curvature` (1/m); returns how far the robot got before the verdict was `Lost`.
