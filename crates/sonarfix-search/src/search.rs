@@ -296,7 +296,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             Task::Rebase | Task::Vote { .. } | Task::Fit { .. } => Phase::Lines,
             Task::Bank => Phase::Bank,
             Task::Pairs { .. } => Phase::Pairs,
-            Task::Along(_) => Phase::GlobalCheck,
+            Task::Along { .. } => Phase::GlobalCheck,
         }
     }
 

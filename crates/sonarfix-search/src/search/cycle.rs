@@ -6,7 +6,6 @@ use sonarfix::geometry::units::Metres;
 use super::Search;
 use super::bank::{Entry, SAME_PLACE, moved};
 use super::candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
-use super::decision::CHECKS;
 use super::lines::{Line, TILTS};
 use super::refine::Prior;
 use super::state::{Decision, Task, Work};
@@ -17,11 +16,13 @@ pub(super) const LEAST_PINGS: usize = 12;
 /// Pairs of lines that every cycle tries, and those that take turns.
 pub(super) const BEST_PAIRS: u8 = 4;
 pub(super) const OTHER_PAIRS: u8 = 4;
+/// Lines that are moved along every wall.
+pub(super) const CHECKED_LINES: u8 = 2;
 
 /// Candidates are rejected below this share of the best score, and so much below it: those of pairs, and those of the global check. A
 /// hypothesis whose score is by more than the second lower is certainly no rival.
 const OF_PAIR: (f32, f32) = (0.25, f32::MAX);
-const OF_CHECK: (f32, f32) = (0.7, 20.0);
+const OF_CHECK: (f32, f32) = (0.6, 30.0);
 
 /// How far beside its region a start may seem to lie: metres, and metres per metre travelled since.
 pub(super) const REGION_MARGIN: f32 = 0.1;
@@ -75,7 +76,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             Task::Fit { line } => self.fit(line),
             Task::Bank => self.refine(),
             Task::Pairs { pair, pairs } => self.try_pairs(pair, pairs),
-            Task::Along(along) => self.check(along),
+            Task::Along { line, along } => self.check(line, along),
         };
     }
 
@@ -142,7 +143,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
     pub(super) fn try_pairs(&mut self, pair: u8, mut pairs: Pairs) -> Task {
         let Some((first, second)) = self.pair(pair) else {
             if self.is_check_due {
-                return Task::Along(AlongWalls::default());
+                return Task::Along { line: 0, along: AlongWalls::default() };
             }
             self.decide(false);
             return Task::Rebase;
@@ -156,25 +157,23 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         Task::Pairs { pair, pairs }
     }
 
-    /// Makes a step of a global check: a line is moved along every wall.
     #[inline(never)]
-    pub(super) fn check(&mut self, mut along: AlongWalls) -> Task {
-        let (map, bend) = (&self.echoes.reflectors.map, self.window.bend());
-        match self.checked().map(|line| along.next(map, line, bend)) {
-            Some(Generated::Candidate(placement)) => self.try_candidate(placement, 0.25, OF_CHECK),
-            Some(Generated::Nothing) => {}
-            Some(Generated::Done) | None => {
-                self.decide(true);
-                return Task::Rebase;
+    pub(super) fn check(&mut self, line: u8, mut along: AlongWalls) -> Task {
+        let nth = usize::from(line) + usize::from(CHECKED_LINES) * usize::from(self.checks % 2);
+        let checked = self.lines.all().get(nth).copied();
+        let Some(checked) = checked.filter(|_| line < CHECKED_LINES) else {
+            self.decide(true);
+            return Task::Rebase;
+        };
+        let bend = self.window.bend();
+        match along.next(&self.echoes.reflectors.map, &checked, bend) {
+            Generated::Candidate(placement) => self.try_candidate(placement, 0.25, OF_CHECK),
+            Generated::Nothing => {}
+            Generated::Done => {
+                return Task::Along { line: line + 1, along: AlongWalls::default() };
             }
         }
-        Task::Along(along)
-    }
-
-    /// The line of this global check: the best ones take turns.
-    pub(super) fn checked(&self) -> Option<&Line> {
-        let lines = self.lines.all();
-        lines.get(usize::from(self.checks % CHECKS).checked_rem(lines.len())?)
+        Task::Along { line, along }
     }
 
     /// Tries a placement that is not within `near` of one of the bank, and is rejected once it cannot reach the share `rivalry` of the best

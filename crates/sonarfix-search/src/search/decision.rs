@@ -15,7 +15,7 @@ const UNEXPLAINED: f32 = 22.0;
 /// Hypotheses are rivals whose evidence is less than this below that of the best one.
 const RIVAL: f32 = 6.0;
 /// So many global checks are made before an answer since the last rival, the last one with a clear lead.
-pub(super) const CHECKS: u8 = 3;
+const CHECKS: u8 = 3;
 /// A global check is made at least once in so many cycles.
 const CHECK_EVERY: u32 = 4;
 /// A position with a larger deviation than this is undetermined, metres.

@@ -15,7 +15,7 @@ pub(super) enum Task {
     Fit { line: u8 },
     Bank,
     Pairs { pair: u8, pairs: Pairs },
-    Along(AlongWalls),
+    Along { line: u8, along: AlongWalls },
 }
 
 /// What takes several evaluations, before the task goes on.

@@ -13,7 +13,7 @@ use sonarfix::geometry::vector::Vector;
 const STEPS: u8 = 2;
 const STEPS_OF_ANSWER: u8 = 4;
 /// By how much the running sum may fall short: scores deviate by 1.3 a ping.
-const LEAD: f32 = 6.0;
+const LEAD: f32 = 8.0;
 
 /// Of what may answer a ping, so much is looked at in one evaluation; in the one that finds it, [`Hearing::at_first`].
 const HEARD_AT_ONCE: usize = 4;
@@ -157,7 +157,7 @@ impl Trial {
     /// wanted final score would have. Earlier stages are less sharp and ask for less.
     fn least_sum(&self, pings: usize) -> f32 {
         let (share, slack) = match self.stage {
-            Stage::Coarse => (0.6, 0.0),
+            Stage::Coarse => (0.5, 0.0),
             Stage::Step(0) => (0.7, 0.0),
             Stage::Step(_) | Stage::Fine => (0.9, 0.1),
         };

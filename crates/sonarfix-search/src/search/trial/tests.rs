@@ -132,7 +132,7 @@ proptest! {
         };
         let entry = Entry::proposed(placement, past);
         // Deviation of each stage, share of the wanted mean and slack.
-        let coarse = (0.15, 0.6, 0.0);
+        let coarse = (0.15, 0.5, 0.0);
         let (fine, sharp) = (echoes.fine(), echoes.sharp());
         let steps = [(0.08, 0.7, 0.0), (fine, 0.9, 0.1), (sharp, 0.9, 0.1), (sharp, 0.9, 0.1)];
         let least = if kind == 0 { wanted.unwrap_or(f32::NEG_INFINITY) } else { f32::NEG_INFINITY };
@@ -153,7 +153,7 @@ proptest! {
             let mut rejected = None;
             for (seen, (running, evaluations)) in (1_u16..).zip(&sum.running) {
                 let rate = share * f64::from(least) / f64::from(u16::try_from(pings).unwrap()) - slack;
-                let limit = rate * f64::from(seen) - 6.0;
+                let limit = rate * f64::from(seen) - 8.0;
                 prop_assume!((f64::from(*running) - limit).abs() > 1e-3);
                 if f64::from(*running) < limit {
                     rejected = Some(*evaluations);
