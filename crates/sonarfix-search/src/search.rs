@@ -35,7 +35,7 @@ use bank::{Bank, Entry, moved};
 use candidates::Placement;
 use lines::Lines;
 use score::EchoModel;
-use state::{Decision, Task, Work};
+use state::{Decision, GlobalCheck, Task, Work};
 use window::Window;
 
 pub use parameters::SearchParameters;
@@ -147,9 +147,7 @@ pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
     cycles: u32,
     /// Novel pings when the last cycle ended.
     taken: u16,
-    is_check_due: bool,
-    /// Global checks since the last rival, which take turns with the lines.
-    checks: u8,
+    check: GlobalCheck,
     /// Whether the last cycle has found an answer, which the next one refines.
     is_found: bool,
     answer: Decision,
@@ -193,8 +191,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             work: Work::None,
             cycles: 0,
             taken: 0,
-            is_check_due: true,
-            checks: 0,
+            check: GlobalCheck::default(),
             is_found: false,
             answer: Decision::Searching,
             region: None,
@@ -217,8 +214,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.work = Work::None;
         self.cycles = 0;
         self.taken = 0;
-        self.is_check_due = true;
-        self.checks = 0;
+        self.check = GlobalCheck::default();
         self.is_found = false;
         self.answer = Decision::Searching;
         self.region = None;
@@ -296,7 +292,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             Task::Rebase | Task::Vote { .. } | Task::Fit { .. } => Phase::Lines,
             Task::Bank => Phase::Bank,
             Task::Pairs { .. } => Phase::Pairs,
-            Task::Along { .. } => Phase::GlobalCheck,
+            Task::Check { .. } => Phase::GlobalCheck,
         }
     }
 

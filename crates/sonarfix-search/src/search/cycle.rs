@@ -1,11 +1,11 @@
-//! The stages of a cycle, in bounded slices: lines, the bank, pairs of lines on pairs of walls, and lines along every wall.
+//! The stages of a cycle, in bounded slices: lines, the bank, pairs of lines on pairs of walls, and a part of the global check.
 
 use sonarfix::geometry::numeric::at_least;
 use sonarfix::geometry::units::Metres;
 
 use super::Search;
 use super::bank::{Entry, SAME_PLACE, moved};
-use super::candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
+use super::candidates::{Generated, Pairs, Placement, make_a_pair};
 use super::lines::{Line, TILTS};
 use super::refine::Prior;
 use super::state::{Decision, Task, Work};
@@ -16,8 +16,9 @@ pub(super) const LEAST_PINGS: usize = 12;
 /// Pairs of lines that every cycle tries, and those that take turns.
 pub(super) const BEST_PAIRS: u8 = 4;
 pub(super) const OTHER_PAIRS: u8 = 4;
-/// Lines that are moved along every wall.
-pub(super) const CHECKED_LINES: u8 = 2;
+/// Lines that the global check moves along every wall, one after the other, and its steps in one cycle.
+pub(super) const CHECKED_LINES: usize = 4;
+pub(super) const CHECK_STEPS: u16 = 500;
 
 /// Candidates are rejected below this share of the best score, and so much below it: those of pairs, and those of the global check. A
 /// hypothesis whose score is by more than the second lower is certainly no rival.
@@ -76,7 +77,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             Task::Fit { line } => self.fit(line),
             Task::Bank => self.refine(),
             Task::Pairs { pair, pairs } => self.try_pairs(pair, pairs),
-            Task::Along { line, along } => self.check(line, along),
+            Task::Check { steps } => self.check(steps),
         };
     }
 
@@ -142,11 +143,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
     #[inline(never)]
     pub(super) fn try_pairs(&mut self, pair: u8, mut pairs: Pairs) -> Task {
         let Some((first, second)) = self.pair(pair) else {
-            if self.is_check_due {
-                return Task::Along { line: 0, along: AlongWalls::default() };
-            }
-            self.decide(false);
-            return Task::Rebase;
+            return Task::Check { steps: 0 };
         };
         let bend = self.window.bend();
         match pairs.next(&self.echoes.reflectors.map, &first, &second, bend) {
@@ -157,23 +154,24 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         Task::Pairs { pair, pairs }
     }
 
+    /// Moves a line a step on along the walls.
     #[inline(never)]
-    pub(super) fn check(&mut self, line: u8, mut along: AlongWalls) -> Task {
-        let nth = usize::from(line) + usize::from(CHECKED_LINES) * usize::from(self.checks % 2);
-        let checked = self.lines.all().get(nth).copied();
-        let Some(checked) = checked.filter(|_| line < CHECKED_LINES) else {
-            self.decide(true);
+    pub(super) fn check(&mut self, steps: u16) -> Task {
+        let lines = self.lines.all();
+        let lines = lines.get(..CHECKED_LINES).unwrap_or(lines);
+        let nth = usize::from(self.check.turn).checked_rem(lines.len());
+        let line = nth.and_then(|nth| lines.get(nth)).copied();
+        let Some(line) = line.filter(|_| steps < CHECK_STEPS) else {
+            self.decide();
             return Task::Rebase;
         };
         let bend = self.window.bend();
-        match along.next(&self.echoes.reflectors.map, &checked, bend) {
+        match self.check.along.next(&self.echoes.reflectors.map, &line, bend) {
             Generated::Candidate(placement) => self.try_candidate(placement, 0.25, OF_CHECK),
             Generated::Nothing => {}
-            Generated::Done => {
-                return Task::Along { line: line + 1, along: AlongWalls::default() };
-            }
+            Generated::Done => self.check.end_line(),
         }
-        Task::Along { line, along }
+        Task::Check { steps: steps + 1 }
     }
 
     /// Tries a placement that is not within `near` of one of the bank, and is rejected once it cannot reach the share `rivalry` of the best

@@ -14,10 +14,8 @@ use super::{Search, at_least_one, largest};
 const UNEXPLAINED: f32 = 22.0;
 /// Hypotheses are rivals whose evidence is less than this below that of the best one.
 const RIVAL: f32 = 6.0;
-/// So many global checks are made before an answer since the last rival, the last one with a clear lead.
-const CHECKS: u8 = 3;
-/// A global check is made at least once in so many cycles.
-const CHECK_EVERY: u32 = 4;
+/// So many lines are moved along every wall before an answer since the last rival.
+const CHECKED: u8 = 2;
 /// A position with a larger deviation than this is undetermined, metres.
 const UNDETERMINED: f32 = 0.3;
 
@@ -35,15 +33,14 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
     }
 
     /// Ends a cycle.
-    pub(super) fn decide(&mut self, is_checked: bool) {
+    pub(super) fn decide(&mut self) {
         self.cycles = self.cycles.wrapping_add(1);
         let taken = self.window.taken();
         let fresh = taken.wrapping_sub(self.taken);
         self.taken = taken;
         let Some(best) = self.bank.entries().first().copied() else {
-            self.checks = 0;
+            self.check.moved = 0;
             self.answer = Decision::Nowhere;
-            self.is_check_due = true;
             return;
         };
         let least = best.evidence - RIVAL;
@@ -58,12 +55,10 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             self.lead(&best) >= self.odds(&best) && is_sharp && self.has_separate_lines();
         self.age(fresh);
         let was_unique = matches!(self.answer, Decision::Unique(_));
-        self.checks = match rivals {
-            1 => self.checks.saturating_add(is_checked.into()),
-            _ => 0,
-        };
-        let is_checked = was_unique || is_checked && self.checks >= CHECKS;
-        self.is_check_due = is_clear && !is_checked || self.cycles.is_multiple_of(CHECK_EVERY);
+        if rivals > 1 {
+            self.check.moved = 0;
+        }
+        let is_checked = was_unique || self.check.moved >= CHECKED;
         // False for NaN.
         let is_anywhere = best.evidence > 0.0;
         self.answer = if !is_anywhere {

@@ -15,7 +15,28 @@ pub(super) enum Task {
     Fit { line: u8 },
     Bank,
     Pairs { pair: u8, pairs: Pairs },
-    Along { line: u8, along: AlongWalls },
+    /// A part of the global check.
+    Check { steps: u16 },
+}
+
+/// Where the global check is. It goes on from cycle to cycle, so that no cycle is long.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct GlobalCheck {
+    /// Where the line is that is being moved along every wall.
+    pub along: AlongWalls,
+    /// Its turn: the lines are moved one after the other.
+    pub turn: u8,
+    /// Lines that were moved along every wall since the last rival.
+    pub moved: u8,
+}
+
+impl GlobalCheck {
+    /// Goes on with the next line.
+    pub fn end_line(&mut self) {
+        self.along = AlongWalls::default();
+        self.turn = self.turn.wrapping_add(1);
+        self.moved = self.moved.saturating_add(1);
+    }
 }
 
 /// What takes several evaluations, before the task goes on.

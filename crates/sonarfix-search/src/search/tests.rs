@@ -139,7 +139,7 @@ proptest! {
     fn a_cycle_ends_by_the_rules(
         best in entry(), leads in prop::collection::vec(0.0_f32..60.0, 0..3), other in entry(),
         fresh in prop_oneof![0_u16..10, 0_u16..40], taken in 0_u16..500, cycles in 0_u32..50, are_separate in any::<bool>(),
-        (is_checked, was_unique, checks) in (any::<bool>(), any::<bool>(), 0_u8..5),
+        (was_unique, moved, turn) in (any::<bool>(), 0_u8..5, any::<u8>()),
         is_sharp_entry in any::<bool>(),
     ) {
         let walls = room();
@@ -159,7 +159,7 @@ proptest! {
         let second = if are_separate { 1.6 } else { 0.1 };
         search.lines = Lines::of(Radians(0.2), &[line(0.0, 9), line(0.05, 8), line(second, 7)]);
         search.cycles = cycles;
-        search.checks = checks;
+        search.check = GlobalCheck { moved, turn, ..GlobalCheck::default() };
         search.taken = taken;
         search.window.set_taken(taken.wrapping_add(fresh));
         let before = if was_unique { Decision::Unique(best) } else { Decision::Several(3) };
@@ -192,18 +192,16 @@ proptest! {
             past * (1.0 - share / 5.0) + share * f64::from(entry.score)
         }).collect();
 
-        search.decide(is_checked);
+        search.decide();
         prop_assert_eq!(search.cycles, cycles + 1);
         prop_assert_eq!(search.taken, search.window.taken());
         for (entry, past) in search.bank.entries().iter().zip(pasts) {
             prop_assert!((f64::from(entry.past) - past).abs() < 1e-3, "{} {past}", entry.past);
         }
-        // The third check since the last rival is the one of this cycle.
-        let checks = if rivals == 1 { checks + u8::from(is_checked) } else { 0 };
-        prop_assert_eq!(search.checks, checks);
-        let is_checked = was_unique || is_checked && checks >= 3;
-        let is_due = is_unique_one && !is_checked || (cycles + 1) % 4 == 0;
-        prop_assert_eq!(search.is_check_due, is_due);
+        // Two lines were moved along the walls since the last rival. A rival does not take the turn from a line.
+        let moved = if rivals == 1 { moved } else { 0 };
+        prop_assert_eq!(search.check, GlobalCheck { moved, turn, ..GlobalCheck::default() });
+        let is_checked = was_unique || moved >= 2;
         let is_unique = is_anywhere && is_unique_one && is_checked;
         prop_assert_eq!(search.is_found, is_unique);
         if !is_anywhere {

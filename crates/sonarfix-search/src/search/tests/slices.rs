@@ -4,7 +4,7 @@ use std::format;
 use std::vec::Vec;
 
 use super::*;
-use crate::search::candidates::AlongWalls;
+use crate::search::candidates::{AlongWalls, Generated};
 use crate::search::trial::Trial;
 
 /// Lines at these angles, the best supported first.
@@ -78,22 +78,63 @@ fn every_line_is_fitted_once() {
     }
 }
 
-/// The first two lines are moved along all walls.
+/// The best four lines are moved along all walls, one after the other, and the best one again.
 #[test]
-fn a_global_check_moves_two_lines_along_the_walls() {
+fn lines_take_turns_in_the_global_check() {
     let walls = room();
+    for (count, turns) in [(2, [0, 1, 0, 1, 0]), (3, [0, 1, 2, 0, 1]), (6, [0, 1, 2, 3, 0])] {
+        let mut search = search(&walls);
+        ping(&mut search, 14);
+        search.lines = lines(&[0.0, 1.0, 2.0, 0.3, 1.3, 2.3][..count]);
+        for (lines_moved, turn) in (0_u8..).zip(turns) {
+            assert_eq!(search.check.moved, lines_moved);
+            let line = search.lines.all()[turn];
+            let mut along = AlongWalls::default();
+            while search.check.moved == lines_moved {
+                assert_eq!(search.check.along, along);
+                let moved = along.next(&search.echoes.reflectors.map, &line, Bend::NONE);
+                search.task = Task::Check { steps: 0 };
+                search.work = Work::None;
+                search.poll(1);
+                match (moved, &search.work) {
+                    (Generated::Candidate(placement), Work::Trial(trial)) => {
+                        let expected = Trial::of_candidate(placement, 0.0, 0.0);
+                        assert_eq!(format!("{trial:?}"), format!("{expected:?}"));
+                    }
+                    (Generated::Nothing | Generated::Done, Work::None) => {}
+                    other => panic!("{other:?}"),
+                }
+            }
+        }
+    }
+}
+
+/// A part of the check ends the cycle; the next cycle goes on where it has ended.
+#[test]
+fn a_cycle_makes_a_part_of_the_global_check() {
+    let walls: Vec<Wall> = (0..1_000).flat_map(|_| room()).collect();
     let mut search = search(&walls);
     ping(&mut search, 14);
     search.lines = lines(&[0.0, 1.0, 2.0]);
-    search.task = Task::Along { line: 0, along: AlongWalls::default() };
-    let mut moved = [false; 4];
-    while let Task::Along { line, along } = search.task {
-        moved[usize::from(line)] |= along != AlongWalls::default();
+    search.task = Task::Check { steps: 0 };
+    let mut steps = 0;
+    while let Task::Check { .. } = search.task {
         search.work = Work::None;
         search.poll(1);
+        steps += 1;
     }
-    assert_eq!(moved, [true, true, false, false]);
-    assert_eq!(search.cycles(), 1);
+    // The last one ends the cycle.
+    assert_eq!((steps, search.cycles()), (501, 1));
+    let check = search.check;
+    assert_ne!(check.along, AlongWalls::default());
+    assert_eq!((check.turn, check.moved), (0, 0));
+    until_end_of(&mut search, Phase::Lines);
+    assert_eq!(search.check, check);
+    // Without a line there is nothing to check.
+    search.lines = lines(&[]);
+    search.task = Task::Check { steps: 0 };
+    search.poll(1);
+    assert_eq!((search.check, search.cycles()), (check, 2));
 }
 
 /// What a hypothesis is, from an entry and the robot's place.
