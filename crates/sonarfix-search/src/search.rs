@@ -36,6 +36,7 @@ use candidates::Placement;
 use lines::Lines;
 use score::EchoModel;
 use state::{Decision, GlobalCheck, Task, Work};
+use trial::Odometry;
 use window::Window;
 
 pub use parameters::SearchParameters;
@@ -135,7 +136,11 @@ fn is_near(number: f32) -> bool {
 /// ```
 #[derive(Debug, Clone)]
 pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
-    parameters: SearchParameters,
+    /// The angles within which a ping is not novel, at rest and then.
+    novel: [Radians; 2],
+    odometry: Odometry,
+    odds: f32,
+    sharpness: (Metres, Radians),
     echoes: EchoModel<'m>,
     servo: (f32, f32),
     sweep: Sweep,
@@ -180,7 +185,10 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         const { assert!(PINGS <= 255, "entries of the bank count pings in a byte") };
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
         Self {
-            parameters,
+            novel: [parameters.novel_angle_at_rest, parameters.novel_angle],
+            odometry: Odometry::of(&parameters),
+            odds: parameters.odds,
+            sharpness: parameters.sharpness,
             echoes: EchoModel::new(map, sonar, &parameters.echo),
             servo: (right, left),
             sweep: Sweep { bearing: right, step: parameters.novel_angle.0 },
@@ -202,11 +210,14 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     /// place, because a copy of it on a microcontroller's stack is large.
     pub fn restart(&mut self, config: &Config, parameters: SearchParameters, map: Map<'m>) {
         let sonar = &config.rangers.first;
-        self.parameters = parameters;
+        self.novel = [parameters.novel_angle_at_rest, parameters.novel_angle];
+        self.odometry = Odometry::of(&parameters);
+        self.odds = parameters.odds;
+        self.sharpness = parameters.sharpness;
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
-        self.echoes = EchoModel::new(map, sonar, &self.parameters.echo);
+        self.echoes = EchoModel::new(map, sonar, &parameters.echo);
         self.servo = (right, left);
-        self.sweep = Sweep { bearing: right, step: self.parameters.novel_angle.0 };
+        self.sweep = Sweep { bearing: right, step: parameters.novel_angle.0 };
         self.window.restart(sonar.mount.into());
         self.lines.restart(sonar.cone, sonar.ranging != Ranging::Sound);
         self.bank.clear();
@@ -261,8 +272,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.sweep.advance(self.servo);
         let range =
             range.map(|range| range.0).filter(|range| *range <= self.echoes.reflectors.max_range);
-        let novel = [self.parameters.novel_angle_at_rest, self.parameters.novel_angle];
-        Ok(self.window.ping(bearing.0, range, novel))
+        Ok(self.window.ping(bearing.0, range, self.novel))
     }
 
     /// Adds a pose of the robot, as it may be now, to the bank: the place where it was lost, or the

@@ -122,9 +122,9 @@ fn a_lost_robot_begins_to_search_with_the_pose_it_had() {
     let prior = config().prior;
     let wheels = [prior.scale_right, prior.scale_left];
     let parameters = SearchParameters::calibrated(&config(), wheels, prior.track_width);
-    let (is, region) = robot.search.begun();
-    assert!((is.drift - parameters.drift).abs().0 < 1e-5, "{is:?}");
-    assert!((is.turn_scale - parameters.turn_scale).abs() < 1e-5, "{is:?}");
+    let ([drift, turn_scale], region) = robot.search.begun();
+    assert!((drift - parameters.drift.0).abs() < 1e-5, "{drift}");
+    assert!((turn_scale - parameters.turn_scale).abs() < 1e-5, "{turn_scale}");
     assert_eq!(region, None);
 }
 

@@ -7,9 +7,8 @@ use super::Search;
 use super::bank::{Entry, SAME_PLACE, moved};
 use super::candidates::{Generated, Pairs, Placement, make_a_pair};
 use super::lines::{Line, TILTS};
-use super::refine::Prior;
 use super::state::{Decision, Task, Work};
-use super::trial::{Odometry, Trial, Verdict};
+use super::trial::{Trial, Verdict};
 
 /// Fewer pings than these are no window to search with.
 pub(super) const LEAST_PINGS: usize = 12;
@@ -43,10 +42,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             }
             Work::Trial(trial) => {
                 let is_answer = trial.is_answer;
-                let parameters = &self.parameters;
-                let prior = Prior { drift: parameters.drift.0, turn_scale: parameters.turn_scale };
-                let odometry = Odometry { prior, per_metre: parameters.odometry };
-                match trial.advance(&self.echoes, &self.window, &odometry) {
+                match trial.advance(&self.echoes, &self.window, &self.odometry) {
                     Verdict::Running => return,
                     Verdict::Rejected => self.bank.end_trial(),
                     Verdict::Scored(entry) if is_answer => self.conclude(entry),

@@ -8,10 +8,14 @@ use sonarfix::map::WallId;
 use super::bank::{Entry, State};
 use super::state::Decision;
 use super::trial::count;
-use super::{Search, at_least_one, largest};
+use super::{Search, largest};
 
 /// An answer needs a logarithm of odds that is by so much larger if the map explained no echo: what misleads a search is furniture.
 const UNEXPLAINED: f32 = 22.0;
+/// So many echoes more count as unexplained: the share that the map explains of a few echoes is uncertain.
+const UNKNOWN_ECHOES: f32 = 4.0;
+/// Evidence that an answer needs besides: with less, a few echoes decide, which often fit elsewhere as well.
+const LEAST_EVIDENCE: f32 = 60.0;
 /// Hypotheses are rivals whose evidence is less than this below that of the best one.
 const RIVAL: f32 = 6.0;
 /// So many lines are moved along every wall before an answer since the last rival.
@@ -48,11 +52,13 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         let spread = &best.spread;
         let variance = largest(spread.xx, spread.xy, spread.yy);
         let is_determined = variance < UNDETERMINED * UNDETERMINED;
-        let (position, heading) = self.parameters.sharpness;
+        let (position, heading) = self.sharpness;
         let is_sharp =
             variance < position.0 * position.0 && spread.rotation < heading.0 * heading.0;
-        let is_clear =
-            self.lead(&best) >= self.odds(&best) && is_sharp && self.has_separate_lines();
+        let is_clear = self.lead(&best) >= self.odds(&best)
+            && best.evidence >= LEAST_EVIDENCE
+            && is_sharp
+            && self.has_separate_lines();
         self.age(fresh);
         let was_unique = matches!(self.answer, Decision::Unique(_));
         if rivals > 1 {
@@ -83,8 +89,8 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
     /// Logarithm of the odds that an answer needs.
     #[inline(never)]
     fn odds(&self, best: &Entry) -> f32 {
-        let explained = f32::from(best.explained) / at_least_one(best.echoes);
-        self.parameters.odds + UNEXPLAINED * (1.0 - explained)
+        let explained = f32::from(best.explained) / (f32::from(best.echoes) + UNKNOWN_ECHOES);
+        self.odds + UNEXPLAINED * (1.0 - explained)
     }
 
     /// Counts what so many new pings have moved through the window as past.

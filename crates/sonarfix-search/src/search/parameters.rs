@@ -21,9 +21,8 @@ pub struct SearchParameters {
     pub odometry: f32,
     /// What a ping returns besides the range of its wall.
     pub echo: EchoParameters,
-    /// Logarithm of the odds by which a unique answer leads every other hypothesis and a place without walls, if the map explains every
-    /// echo; up to 22 more if it explains fewer. Pings near each other share the errors of map and odometry, so that it is above
-    /// that of odds of 1,000 to 1, 6.9.
+    /// Logarithm of the odds by which a unique answer leads every other hypothesis and a place without walls, if the map explains all of
+    /// many echoes; up to 22 more if they are few, or it explains fewer.
     pub odds: f32,
     /// Largest deviations of position and heading of a unique answer.
     pub sharpness: (Metres, Radians),
@@ -38,7 +37,7 @@ impl Default for SearchParameters {
             turn_scale: 0.02,
             odometry: 0.015,
             echo: EchoParameters::HC_SR04,
-            odds: 10.0,
+            odds: 6.0,
             sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
     }

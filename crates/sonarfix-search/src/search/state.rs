@@ -15,7 +15,6 @@ pub(super) enum Task {
     Fit { line: u8 },
     Bank,
     Pairs { pair: u8, pairs: Pairs },
-    /// A part of the global check.
     Check { steps: u16 },
 }
 

@@ -8,7 +8,7 @@ use super::*;
 use crate::search::bank::State;
 use crate::search::candidates::make_a_pair;
 use crate::search::lines::Line;
-use crate::search::refine::Spread;
+use crate::search::refine::{Prior, Spread};
 use crate::search::window::Bend;
 use sonarfix::config::Config;
 use sonarfix::geometry::units::PerRootMetre;
@@ -59,9 +59,10 @@ impl Search<'_> {
         self.window.newest(0).and_then(window::Ping::range)
     }
 
-    /// The parameters and the region.
-    pub(crate) fn begun(&self) -> (SearchParameters, Option<Region>) {
-        (self.parameters, self.region)
+    /// The deviations of drift and turn scale, and the region.
+    pub(crate) fn begun(&self) -> ([f32; 2], Option<Region>) {
+        let Prior { drift, turn_scale } = self.odometry.prior;
+        ([drift, turn_scale], self.region)
     }
 }
 
@@ -166,25 +167,24 @@ proptest! {
         search.answer = before;
         search.work = Work::None;
 
-        let parameters = search.parameters;
-        let explained = f64::from(best.explained) / f64::from(best.echoes.max(1));
-        let (least, odds) = (6.0, 10.0 + 22.0 * (1.0 - explained));
+        let explained = f64::from(best.explained) / (f64::from(best.echoes) + 4.0);
+        let (least, odds) = (6.0, 6.0 + 22.0 * (1.0 - explained));
         let evidence: Vec<f64> = bank.iter().map(|entry| f64::from(entry.evidence)).collect();
         let (variance, axis) = largest_of(&best.spread);
         let sharpness = (
-            f64::from(parameters.sharpness.0.0).powi(2), f64::from(parameters.sharpness.1.0).powi(2),
+            f64::from(search.sharpness.0.0).powi(2), f64::from(search.sharpness.1.0).powi(2),
         );
         let rotation = f64::from(best.spread.rotation);
         let rival = evidence.get(1).copied().unwrap_or(0.0).max(0.0);
         let lead = evidence[0] - rival;
         prop_assume!(evidence.iter().skip(1).all(|other| is_clear(evidence[0] - other, least)));
-        prop_assume!(is_clear(lead, odds) && is_clear(evidence[0], 0.0) && is_clear(variance, 0.09));
+        prop_assume!(is_clear(lead, odds) && is_clear(evidence[0], 0.0) && is_clear(evidence[0], 60.0) && is_clear(variance, 0.09));
         prop_assume!(is_clear(variance / sharpness.0, 1.0) && is_clear(rotation / sharpness.1, 1.0));
         let rivals = evidence.iter().filter(|other| evidence[0] - **other < least).count();
         let is_anywhere = evidence[0] > 0.0;
         let is_determined = variance < 0.09;
         let is_sharp = variance < sharpness.0 && rotation < sharpness.1;
-        let is_unique_one = lead > odds && is_sharp && are_separate;
+        let is_unique_one = lead > odds && evidence[0] > 60.0 && is_sharp && are_separate;
         // What has moved through the window of 16 pings; the past fades in five windows.
         let share = (f64::from(fresh) / 16.0).min(1.0);
         let pasts: Vec<f64> = bank.iter().map(|entry| {

@@ -3,6 +3,7 @@
 
 use super::bank::{Entry, State};
 use super::candidates::Placement;
+use super::parameters::SearchParameters;
 use super::refine::{Equations, Placed, Prior, Tolerance};
 use super::score::{EchoModel, Explanation, Hearing, Sharpness};
 use super::window::{Chain, Window};
@@ -40,6 +41,13 @@ pub(super) struct Odometry {
     pub prior: Prior,
     /// Deviation that a metre adds to the place of a ping besides, metres.
     pub per_metre: f32,
+}
+
+impl Odometry {
+    pub fn of(parameters: &SearchParameters) -> Self {
+        let prior = Prior { drift: parameters.drift.0, turn_scale: parameters.turn_scale };
+        Self { prior, per_metre: parameters.odometry }
+    }
 }
 
 #[derive(Debug, Clone)]
