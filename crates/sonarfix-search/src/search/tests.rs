@@ -160,7 +160,7 @@ proptest! {
         let second = if are_separate { 1.6 } else { 0.1 };
         search.lines = Lines::of(Radians(0.2), &[line(0.0, 9), line(0.05, 8), line(second, 7)]);
         search.cycles = cycles;
-        search.check = GlobalCheck { moved, turn, ..GlobalCheck::default() };
+        search.check = GlobalCheck { turn, moved, ..GlobalCheck::default() };
         search.taken = taken;
         search.window.set_taken(taken.wrapping_add(fresh));
         let before = if was_unique { Decision::Unique(best) } else { Decision::Several(3) };
@@ -200,7 +200,7 @@ proptest! {
         }
         // Two lines were moved along the walls since the last rival. A rival does not take the turn from a line.
         let moved = if rivals == 1 { moved } else { 0 };
-        prop_assert_eq!(search.check, GlobalCheck { moved, turn, ..GlobalCheck::default() });
+        prop_assert_eq!(search.check, GlobalCheck { turn, moved, ..GlobalCheck::default() });
         let is_checked = was_unique || moved >= 2;
         let is_unique = is_anywhere && is_unique_one && is_checked;
         prop_assert_eq!(search.is_found, is_unique);
