@@ -136,7 +136,7 @@ fn is_near(number: f32) -> bool {
 /// ```
 #[derive(Debug, Clone)]
 pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
-    /// The angles within which a ping is not novel, at rest and then.
+    /// A ping is novel if none was sent in a direction within this angle: before the robot has driven 20 cm, and after that.
     novel: [Radians; 2],
     odometry: Odometry,
     odds: f32,

@@ -18,8 +18,9 @@ const UNKNOWN_ECHOES: f32 = 4.0;
 const LEAST_EVIDENCE: f32 = 60.0;
 /// Hypotheses are rivals whose evidence is less than this below that of the best one.
 const RIVAL: f32 = 6.0;
-/// So many lines are moved along every wall before an answer since the last rival.
-const CHECKED: u8 = 2;
+/// So many lines reach the end of the last wall between the last rival and an answer. The first may have been on its way: one was moved
+/// along every wall.
+const LINES_BEFORE_ANSWER: u8 = 2;
 /// A position with a larger deviation than this is undetermined, metres.
 const UNDETERMINED: f32 = 0.3;
 
@@ -64,7 +65,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         if rivals > 1 {
             self.check.moved = 0;
         }
-        let is_checked = was_unique || self.check.moved >= CHECKED;
+        let is_checked = was_unique || self.check.moved >= LINES_BEFORE_ANSWER;
         // False for NaN.
         let is_anywhere = best.evidence > 0.0;
         self.answer = if !is_anywhere {

@@ -25,7 +25,7 @@ pub(super) struct GlobalCheck {
     pub along: AlongWalls,
     /// Its turn: the lines are moved one after the other.
     pub turn: u8,
-    /// Lines that were moved along every wall since the last rival.
+    /// Lines that have reached the end of the last wall since the last rival.
     pub moved: u8,
 }
 

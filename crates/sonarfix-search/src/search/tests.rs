@@ -198,7 +198,7 @@ proptest! {
         for (entry, past) in search.bank.entries().iter().zip(pasts) {
             prop_assert!((f64::from(entry.past) - past).abs() < 1e-3, "{} {past}", entry.past);
         }
-        // Two lines were moved along the walls since the last rival. A rival does not take the turn from a line.
+        // Two lines have reached the end since the last rival. A rival does not take the turn from a line.
         let moved = if rivals == 1 { moved } else { 0 };
         prop_assert_eq!(search.check, GlobalCheck { turn, moved, ..GlobalCheck::default() });
         let is_checked = was_unique || moved >= 2;
