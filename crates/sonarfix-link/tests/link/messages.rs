@@ -332,6 +332,7 @@ fn estimate(source: &mut impl Source) -> Estimate {
             accepted_in_a_row: source.bits16(),
             gated_in_a_row: source.bits16(),
             silent_in_a_row: source.bits16(),
+            unaided: 0,
             inflations: source.bits16(),
             rolled_since_fix: Metres(source.single()),
             time_since_fix: source.duration(),

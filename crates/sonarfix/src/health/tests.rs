@@ -126,21 +126,40 @@ fn an_improvement_has_each_of_its_conditions() {
     assert!(!improved(0.0, 0, 2));
 }
 
-/// Without an accepted range: `Degraded` at the eighth ping, `Lost` at the thirtieth of a robot that is too uncertain to measure.
+/// Without an accepted range the verdict is `Degraded` from the eighth ping on.
 #[test]
-fn pings_without_a_range_degrade_by_their_number() {
-    let first = |uncertainty, verdict| {
-        let mut health = Health::default();
-        (1..=40).find(|_| {
-            health.record_fix(&Fix::Refused(Refusal::NoEcho), 0.0, false, uncertainty, &LIMITS);
-            health.verdict == verdict
-        })
-    };
-    assert_eq!((first(CERTAIN, Verdict::Degraded), first(CERTAIN, Verdict::Lost)), (Some(8), None));
-    assert_eq!(first(UNCERTAIN, Verdict::Lost), Some(30));
+fn eight_pings_without_a_range_degrade() {
+    let mut health = Health::default();
+    let first = (1..=40).find(|_| {
+        health.record_fix(&Fix::Refused(Refusal::NoEcho), 0.0, false, CERTAIN, &LIMITS);
+        health.verdict == Verdict::Degraded
+    });
+    assert_eq!((first, health.verdict), (Some(8), Verdict::Degraded));
+}
+
+/// The ping at which the verdict is `Lost` if those for which `is_accepted` are accepted, and the others have no echo.
+fn lost_at(uncertainty: PoseUncertainty, is_accepted: fn(u32) -> bool) -> Option<u32> {
+    let mut health = Health::default();
+    (1..=1000).find(|&ping| {
+        let fix = if is_accepted(ping) { accepted(1.0) } else { Fix::Refused(Refusal::NoEcho) };
+        health.record_fix(&fix, 0.0, false, uncertainty, &LIMITS);
+        health.verdict == Verdict::Lost
+    })
+}
+
+#[test]
+fn thirty_pings_that_are_not_accepted_lose_an_uncertain_pose() {
+    let lost_at = |uncertainty| lost_at(uncertainty, |_| false);
+    let moved = |position| PoseUncertainty { position: Metres(position), ..CERTAIN };
     let turned = |heading| PoseUncertainty { heading: Radians(heading), ..CERTAIN };
-    assert_eq!(first(turned(2.0 * LIMITS.heading.0), Verdict::Lost), None);
-    assert_eq!(first(turned(2.01 * LIMITS.heading.0), Verdict::Lost), Some(30));
-    let moved = PoseUncertainty { position: Metres(1.01 * LIMITS.position.0), ..CERTAIN };
-    assert_eq!(first(moved, Verdict::Lost), Some(30));
+    assert_eq!((lost_at(moved(0.15)), lost_at(moved(0.151))), (None, Some(30)));
+    let limit = 2.0 * LIMITS.heading.0;
+    assert_eq!((lost_at(turned(limit)), lost_at(turned(1.01 * limit))), (None, Some(30)));
+}
+
+/// If half of the pings are accepted the pose is not lost. Of three, two count, and the accepted one takes back one.
+#[test]
+fn an_accepted_ping_outweighs_another_one() {
+    assert_eq!(lost_at(UNCERTAIN, |ping| ping % 2 == 0), None);
+    assert_eq!(lost_at(UNCERTAIN, |ping| ping % 3 == 0), Some(86));
 }
