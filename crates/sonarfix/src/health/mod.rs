@@ -85,9 +85,8 @@ const BETTER_BELOW: f32 = 0.5;
 const MAX_CONFIRMABLE_INFLATIONS: u16 = 1;
 /// [`Health::unaided`] at which the verdict is [`Verdict::Lost`].
 const LOST_AFTER_UNAIDED: u16 = 30;
-/// Standard deviation of the position beyond which a ping that is not accepted counts: less than half of a door, and more than what
-/// furniture and a few missing walls lead to. Chosen with the number above on one recording (freiburg-079) and generated rooms with the
-/// seeds 210000 to 210023.
+/// Standard deviation of the position beyond which a ping that is not accepted counts: more than what furniture and a few missing walls
+/// lead to. Chosen with the number above on one recording (freiburg-079) and generated rooms with the seeds 210000 to 210023.
 const UNAIDED_BEYOND: Metres = Metres(0.15);
 
 /// Pings in a row without an accepted range, for whatever reason: the estimate then depends on the encoders.
