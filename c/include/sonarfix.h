@@ -450,7 +450,7 @@ enum sonarfix_verdict_t
    */
   SONARFIX_VERDICT_DEGRADED = 1,
   /*
-   Ranges keep disagreeing, or the path has led through a wall: the pose is probably wrong.
+   Ranges keep disagreeing, too few agree with an uncertain pose, or the path has led through a wall: the pose is probably wrong.
    */
   SONARFIX_VERDICT_LOST = 2,
 };

@@ -195,7 +195,7 @@ pub enum sonarfix_verdict_t {
     SONARFIX_VERDICT_TRACKING = 0,
     /// Ranges are missing or begin to disagree: the estimate depends on the encoders.
     SONARFIX_VERDICT_DEGRADED = 1,
-    /// Ranges keep disagreeing, or the path has led through a wall: the pose is probably wrong.
+    /// Ranges keep disagreeing, too few agree with an uncertain pose, or the path has led through a wall: the pose is probably wrong.
     SONARFIX_VERDICT_LOST = 2,
 }
 

@@ -32,8 +32,8 @@
 //!   [`max_position_deviation`](GatingParameters::max_position_deviation), or that of the heading a
 //!   quarter of the cone.
 //! - *Uncertain* for `Lost`: a deviation of the position above 15 cm, or of the heading above half of the cone, at which no wall can be
-//!   measured. Such an estimate accepts what fits by chance, and the evidence of its pings is small. It is lost if fewer than half
-//!   of them are accepted.
+//!   measured. Such an estimate accepts what fits by chance, and the evidence of its pings is small. What tells is how many of them are
+//!   accepted.
 //!
 //! A path through a wall makes the verdict `Lost` (eq. 59).
 //!
@@ -65,7 +65,7 @@ pub enum Verdict {
     Tracking,
     /// Ranges are missing or begin to disagree: the estimate depends on the encoders.
     Degraded,
-    /// Ranges keep disagreeing, or the path has led through a wall: the pose is probably wrong.
+    /// Ranges keep disagreeing, too few agree with an uncertain pose, or the path has led through a wall: the pose is probably wrong.
     Lost,
 }
 
@@ -127,7 +127,8 @@ pub struct Health {
     pub gated_in_a_row: u16,
     /// Pings without a usable range since the last one used or gated.
     pub silent_in_a_row: u16,
-    /// Pings that were not accepted while the pose was uncertain, less those accepted since. Not part of a serialized health.
+    /// Pings that were not accepted while the pose was uncertain, less those that were accepted: from 0 to 30, at which the verdict is
+    /// [`Verdict::Lost`]. Not part of a serialized health.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub unaided: u16,
     /// Inflations of the covariance of a lost robot ([`GatingParameters::inflation`]) since the verdict
@@ -347,7 +348,8 @@ impl Health {
 
     fn count_unused(&mut self, limits: &Limits) {
         self.accepted_in_a_row = 0;
-        let is_uncertain = self.position_deviation > UNAIDED_BEYOND || self.is_unmeasurable(limits);
+        let is_uncertain = self.position_deviation > UNAIDED_BEYOND
+            || self.heading_deviation > limits.heading * 2.0;
         if is_uncertain && self.unaided < LOST_AFTER_UNAIDED {
             self.unaided += 1;
         }
@@ -369,10 +371,6 @@ impl Health {
 
     fn is_uncertain(&self, limits: &Limits) -> bool {
         self.position_deviation > limits.position || self.heading_deviation > limits.heading
-    }
-
-    fn is_unmeasurable(&self, limits: &Limits) -> bool {
-        self.heading_deviation > limits.heading * 2.0
     }
 
     fn can_improve(&self, limits: &Limits) -> bool {
