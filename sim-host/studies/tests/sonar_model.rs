@@ -32,18 +32,19 @@ fn the_nxt_model_matches_the_sensor() {
     }
 }
 
-/// The preset is the fit, rounded to 0.01.
+/// The preset is the fit, rounded to 0.01 and to a millimetre.
 #[test]
 fn the_echo_parameters_of_the_nxt_are_fitted() {
     let Some(comparison) = nxt() else {
         return;
     };
-    let fit = EchoFit::of(&comparison.measured).far;
-    let preset = NXT_ECHO;
-    let preset = [preset.missed, preset.short, preset.long].map(f64::from);
-    for (fit, preset) in fit.into_iter().zip(preset) {
+    let fit = EchoFit::of(&comparison.measured);
+    let preset = [NXT_ECHO.missed, NXT_ECHO.short, NXT_ECHO.long].map(f64::from);
+    for (fit, preset) in fit.far.into_iter().zip(preset) {
         assert!((fit - preset).abs() <= 0.0051, "{fit} {preset}");
     }
+    let [near, ..] = fit.systematic;
+    assert!((near - f64::from(NXT_ECHO.map_accuracy.0)).abs() <= 0.000_51, "{near}");
 }
 
 #[test]

@@ -91,7 +91,7 @@ pub struct GatingParameters {
     /// Distance without a range used above which the verdict is not `Tracking`.
     pub max_distance_without_fix: Metres,
     /// Standard deviation of the position, in its worst direction, above which the verdict is not
-    /// `Tracking`.
+    /// `Tracking`. A quarter of a metre by default: the position is then within half a metre with a probability of 95 %.
     pub max_position_deviation: Metres,
 }
 
@@ -102,7 +102,7 @@ impl Default for GatingParameters {
             confidence: 1.0,
             inflation: Metres(0.1),
             max_distance_without_fix: Metres(5.0),
-            max_position_deviation: Metres(0.5),
+            max_position_deviation: Metres(0.25),
         }
     }
 }

@@ -1,11 +1,15 @@
 //! The parameters of the echo model of the core, fitted to recorded pings.
 
+use sonarfix_map::devices::NXT_ECHO;
+
 use super::cells::{Cell, Cells, ROW};
 
 /// Rows within 20° of the normal: a localizer aims within them.
 const WITHIN: usize = 4;
 /// Rows within 15°, where a wall is fully audible.
 const FULLY: usize = 3;
+/// Rows within 35°, where half of the walls or more are heard below 0.6 m.
+const HEARD: usize = 7;
 /// Rows of the audibility, up to 45°.
 const AUDIBLE: usize = 9;
 
@@ -20,6 +24,8 @@ pub struct EchoFit {
     pub audible: Vec<f64>,
     /// Angle at which it is one half, degrees; infinite if it never is.
     pub half_angle: f64,
+    /// For each range: root mean square of what the preset's lateness leaves of the bias by angle, metres.
+    pub systematic: [f64; 3],
 }
 
 impl EchoFit {
@@ -30,7 +36,8 @@ impl EchoFit {
         let far = by_range.last().map_or([f64::NAN; 3], |(_, shares)| *shares);
         let audible: Vec<f64> = (0..AUDIBLE).map(|row| audible(measured, row)).collect();
         let half_angle = half_angle(&audible);
-        Self { by_range, far, audible, half_angle }
+        let systematic = [0, 1, 2].map(|column| systematic(measured, column));
+        Self { by_range, far, audible, half_angle, systematic }
     }
 }
 
@@ -83,6 +90,23 @@ fn half_angle(audible: &[f64]) -> f64 {
     f64::INFINITY
 }
 
+/// Each row is weighted by its perpendicular returns.
+#[expect(clippy::cast_precision_loss, reason = "a dozen rows")]
+fn systematic(measured: &Cells, of: usize) -> f64 {
+    let [late, per_radian] = [NXT_ECHO.late, NXT_ECHO.late_per_radian].map(|it| f64::from(it.0));
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (row, cell) in column(measured, 0..HEARD, of).enumerate() {
+        let off = ((row as f64 + 0.5) * ROW).to_radians();
+        let left = cell.bias().unwrap_or(f64::NAN) - late - per_radian * off;
+        let returns = f64::from(cell.perpendicular());
+        if returns > 0.0 {
+            sum += returns * left * left;
+            weight += returns;
+        }
+    }
+    (sum / weight).sqrt()
+}
+
 fn share(count: u32, of: u32) -> f64 {
     f64::from(count) / f64::from(of.max(1))
 }
@@ -132,5 +156,21 @@ mod tests {
         assert!((fit.audible[6] - at_32).abs() < 1e-12 && fit.audible[7] < 1e-12, "{fit:?}");
         let half = 32.5 + 5.0 * (at_32 - 0.5) / at_32;
         assert!((fit.half_angle - half).abs() < 1e-9, "{}", fit.half_angle);
+    }
+
+    /// Perpendicular ranges as late as the preset says, and 6 mm more at 12°: a fifth of the pings.
+    #[test]
+    fn what_lateness_leaves_is_systematic() {
+        let mut cells = Cells::default();
+        let world = World::of(vec![Segment::new([0.4, -9.0], [0.4, 9.0])]);
+        for (degrees, more) in [(2.5_f64, 0.0), (7.5, 0.0), (12.5, 0.006), (17.5, 0.0), (22.5, 0.0)]
+        {
+            let axis = degrees.to_radians();
+            let late = f64::from(NXT_ECHO.late_per_radian.0) * axis;
+            let reading = Some(0.4 + late + more);
+            cells.count(Beam { world: &world, from: [0.0, 0.0], axis, reading });
+        }
+        let [near, ..] = EchoFit::of(&cells).systematic;
+        assert!((near - 0.006 / 5.0_f64.sqrt()).abs() < 1e-9, "{near}");
     }
 }
