@@ -244,8 +244,7 @@ impl<P: BearingRule> Planner<'_, P> {
             on_wall,
             square: self.view.probability_of_square(off),
             noise: self.sonar.noise.variance(expected.range).0,
-            accuracy: wall.accuracy(),
-            of_map: 1.0,
+            of_map: self.config.echo.map_variance(wall.accuracy()),
             place: wall.along(self.view.position()),
             off,
             expected,
@@ -264,9 +263,8 @@ impl<P: BearingRule> Planner<'_, P> {
         let range = expected.range;
         let echo = &self.config.echo;
         let entry = self.history.entry(echo, self.ranger, id, place, range, self.now);
-        let map_variance = echo.map_variance(sight.accuracy, entry.travelled);
-        let of_mount = self.config.mount_noise(self.ranger);
-        let noise = SquareMetres(sight.noise + map_variance * sight.of_map + of_mount);
+        let of_map = sight.of_map * entry.repetition;
+        let noise = SquareMetres(sight.noise + of_map + self.config.mount_noise(self.ranger));
         let ahead = self.view.ahead_of(self.ranger);
         let prediction = self.ekf.predict_measurement(&expected, ahead);
         let weights = self.config.weights;

@@ -87,8 +87,8 @@ impl Scene<'_, '_> {
             let at = Metres(reflector.distance);
             let visible = 1.0 - self.history.clutter.prior_occlusion(echo, at);
             let answers = visible * heard.probability(echo.heard(at));
-            let travelled = self.history.travelled_since(reflector.wall);
-            let noise = echo.map_variance(reflector.accuracy, travelled);
+            let repetition = self.history.repetition(reflector.wall);
+            let noise = echo.map_variance(reflector.accuracy) * repetition;
             let point = (reflector.toward, reflector.distance);
             let density = self.density_of(point, noise, &position, range);
             sum.add(answers, density, reflector.distance > distance);
@@ -222,10 +222,10 @@ mod tests {
                 history.record_echo(&entry, 0.1, Origin::Wall, now);
                 history.record_distance(Metres(travelled));
             }
-            let known = history.travelled_since(used);
-            prop_assert!(known.is_some() == is_used);
-            prop_assert!(known.is_none_or(|known| (known.0 - travelled).abs() < 1e-6));
-            prop_assert!(history.travelled_since(WallId(2)).is_none());
+            let ratio = 2.0 / f64::from(travelled);
+            let repetition = if is_used { (1.0 + ratio * ratio).sqrt() } else { 1.0 };
+            prop_assert!((f64::from(history.repetition(used)) / repetition - 1.0).abs() < 1e-5);
+            prop_assert!(history.repetition(WallId(2)) == 1.0);
 
             let position = SonarPosition::new(config.rangers.first.mount, &ekf.state());
             let expected = ExpectedRange::from_sonar(&walls[0], &position);
@@ -250,8 +250,7 @@ mod tests {
                 let a = wide(heard.probability(config.echo.heard(Metres(it.distance)))) * (1.0 - h / (h + free));
                 let (x, y) = (wide(it.toward.x), wide(it.toward.y));
                 let p = (0.08 * x).powi(2) + (0.05 * y).powi(2);
-                let ratio = 2.0 / wide(travelled);
-                let map_error = if is_used && it.wall == used { (1.0 + ratio * ratio).sqrt() } else { 1.0 };
+                let map_error = if it.wall == used { repetition } else { 1.0 };
                 let noise = &config.rangers.first.noise;
                 let sonar = wide(noise.floor.0).powi(2) + (wide(noise.per_metre) * h).powi(2);
                 let own = accuracy.filter(|_| it.wall == WallId(1));

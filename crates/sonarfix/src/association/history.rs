@@ -16,7 +16,7 @@ use crate::config::{Config, MAX_RANGERS, RangerId};
 use crate::geometry::numeric::{at_least, between};
 use crate::geometry::units::{Instant, Metres, Radians, SquareMetres, seconds};
 use crate::map::WallId;
-use crate::sensor::echo::EchoParameters;
+use crate::sensor::echo::{EchoParameters, repetition};
 use crate::sensor::timing::PingDuration;
 
 /// Number of walls that are stored; a further one replaces the one that was stored first.
@@ -102,8 +102,8 @@ pub(crate) struct Entry {
     pub occlusion: f32,
     /// What returned the latest echo that was probably not the wall's.
     pub source: Option<EchoSource>,
-    /// Distance travelled since a range of the wall was last used.
-    pub travelled: Option<Metres>,
+    /// Factor on the variance of its place, which is common to the ranges of the wall that were used before.
+    pub repetition: f32,
 }
 
 /// What probably returned the echo of a ping at a wall.
@@ -253,10 +253,11 @@ impl History {
         }
     }
 
-    /// Distance travelled since a range of the wall was last used.
-    pub fn travelled_since(&self, wall: WallId) -> Option<Metres> {
-        let recent = self.recent.iter().flatten().find(|recent| recent.wall == wall)?;
-        Some(self.odometer - recent.used_at?)
+    /// [`Entry::repetition`] of a wall.
+    pub fn repetition(&self, wall: WallId) -> f32 {
+        let recent = self.recent.iter().flatten().find(|recent| recent.wall == wall);
+        let used_at = recent.and_then(|recent| recent.used_at);
+        used_at.map_or(1.0, |used_at| repetition(self.odometer - used_at))
     }
 
     /// What is known of a wall with its foot at `foot` and at `range`.
@@ -283,11 +284,12 @@ impl History {
                 used_at: None,
                 other: None,
                 source: None,
-                travelled: None,
+                repetition: 1.0,
             };
         };
         let occlusion = between(prior + recent.above_prior(foot, now), 0.0, MAX_OCCLUSION);
-        let travelled = recent.used_at.map(|used_at| self.odometer - used_at);
+        let since = recent.used_at.map(|used_at| self.odometer - used_at);
+        let repetition = since.map_or(1.0, repetition);
         let own = recent.other.filter(|other| other.ranger == ranger);
         let source = own.map(|other| EchoSource {
             range: other.range,
@@ -295,7 +297,7 @@ impl History {
             age: now.checked_duration_since(other.at).map_or(0.0, seconds),
         });
         let RecentWall { used_at, other, .. } = *recent;
-        Entry { slot, place, used_at, other, occlusion, source, travelled }
+        Entry { slot, place, used_at, other, occlusion, source, repetition }
     }
 
     /// Records that the wall of this entry is occluded with a probability of `occluded`, and what

@@ -35,6 +35,8 @@ pub(super) struct View {
     pub expected: ExpectedRange,
     /// Variance of the number.
     pub noise: SquareMetres,
+    /// What is added to it because its error is common to earlier numbers, m².
+    pub repeated: f32,
     /// For a range of the ranger whose mount is estimated: the unit vector ahead of the robot, in map axes.
     pub ahead: Option<Vector>,
     /// The measured number, or the reason for which it is missing. The sensor explains a missing number as well.
@@ -127,12 +129,13 @@ impl Localizer<'_> {
         let prediction = robot.ekf.predict_measurement(&view.expected, view.ahead);
         let value = view.measured.unwrap_or(view.expected.range);
         let innovation = prediction.innovation(value, view.noise);
-        let found = measurement.explain(&robot, &view, &seen, innovation.variance);
+        let variance = SquareMetres(innovation.variance.0 + view.repeated);
+        let found = measurement.explain(&robot, &view, &seen, variance);
         let fix = if let Err(refusal) = view.measured {
             Fix::Refused(refusal)
         } else {
             let bias = GyroFusion::bias_of(&mut self.gyro);
-            let (ekf, noise) = (&mut self.ekf, view.noise);
+            let (ekf, noise) = (&mut self.ekf, SquareMetres(view.noise.0 + view.repeated));
             use_number(ekf, &prediction, innovation, noise, found.association, bias)?
         };
         if fix.innovation_used().is_some() {

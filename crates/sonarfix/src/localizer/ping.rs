@@ -106,11 +106,11 @@ impl Measurement for Ping<'_> {
             limits: (ranger.min_range, ranger.max_range),
             is_heading_known: viewpoint.is_heading_known(),
         };
-        let map_variance = parameters.map_variance(sight.accuracy, seen.entry.travelled);
         let of_mount = robot.config.mount_noise(aim.ranger);
-        let noise = SquareMetres(sight.noise + map_variance * sight.of_map + of_mount);
+        let noise = SquareMetres(sight.noise + sight.of_map + of_mount);
+        let repeated = sight.of_map * (seen.entry.repetition - 1.0);
         let ahead = viewpoint.ahead_of(aim.ranger);
-        Ok((View { expected, noise, ahead, measured }, seen))
+        Ok((View { expected, noise, repeated, ahead, measured }, seen))
     }
 
     fn explain(

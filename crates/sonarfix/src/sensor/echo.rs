@@ -118,25 +118,26 @@ impl EchoParameters {
         if self.free_path > Metres(0.0) { range.0 / (range.0 + free_path) } else { 0.0 }
     }
 
-    /// Variance of the map error in a range to a wall with this accuracy of its own, if the last range to
-    /// the same wall was used `travelled` metres ago; `None` if there was none.
-    ///
-    /// The error is a first-order Gauss–Markov process of the distance. A sequence of n ranges with
-    /// correlation ρ = exp(−s/L) holds as much information as n independent ones whose variance is
-    /// larger by (1 + ρ)/(1 − ρ) = coth(s/2L); √(1 + (2L/s)²) is within 10 % of it.
+    /// Variance of the place of a wall with this accuracy of its own.
     #[must_use]
     #[inline]
-    pub fn map_variance(&self, accuracy: Option<Metres>, travelled: Option<Metres>) -> f32 {
+    pub fn map_variance(&self, accuracy: Option<Metres>) -> f32 {
         let accuracy = accuracy.unwrap_or(self.map_accuracy).0;
-        let variance = accuracy * accuracy;
-        let Some(travelled) = travelled else {
-            return variance;
-        };
-        let least = 2.0 * MAP_CORRELATION.0 / MAX_REPETITION;
-        let distance = if travelled.0 > least { travelled.0 } else { least };
-        let ratio = 2.0 * MAP_CORRELATION.0 / distance;
-        variance * sqrt(1.0 + ratio * ratio)
+        accuracy * accuracy
     }
+}
+
+/// Factor on the variance of the place of a wall in the correction by a range, if the last range to the same wall was used `travelled` metres ago.
+///
+/// The error is a first-order Gauss–Markov process of the distance. A sequence of n ranges with
+/// correlation ρ = exp(−s/L) holds as much information as n independent ones whose variance is
+/// larger by (1 + ρ)/(1 − ρ) = coth(s/2L); √(1 + (2L/s)²) is within 10 % of it.
+#[inline]
+pub(crate) fn repetition(travelled: Metres) -> f32 {
+    let least = 2.0 * MAP_CORRELATION.0 / MAX_REPETITION;
+    let distance = if travelled.0 > least { travelled.0 } else { least };
+    let ratio = 2.0 * MAP_CORRELATION.0 / distance;
+    sqrt(1.0 + ratio * ratio)
 }
 
 /// Logarithms of probabilities and of densities over that of an echo anywhere, for a score of many

@@ -52,8 +52,8 @@ impl Scene<'_, '_> {
             let heard = if is_weak { Audibility::Rim } else { Audibility::Foot };
             let at = Metres(at);
             let visible = 1.0 - self.history.clutter.prior_occlusion(echo, at);
-            let map_variance = echo.map_variance(wall.accuracy(), self.history.travelled_since(id));
-            let noise = SquareMetres(spot.noise + map_variance * spot.of_map);
+            let repetition = self.history.repetition(id);
+            let noise = SquareMetres(spot.noise + spot.of_map * repetition);
             let innovation = self.ekf.innovation(range, &spot.expected, noise);
             let answers = visible * spot.on_wall * heard.probability(echo.heard(at));
             insert(

@@ -25,7 +25,7 @@ pub(crate) struct Spot {
     pub incidence: Radians,
     /// Variance of the range: noise of the ranger, direction of the beam and curvature, m².
     pub noise: f32,
-    /// Factor on the variance of the place of the wall in the map.
+    /// Variance of the range by the place of the wall in the map, m².
     pub of_map: f32,
 }
 
@@ -62,7 +62,6 @@ impl Viewpoint<'_> {
             square,
             off: spot.incidence,
             noise: spot.noise,
-            accuracy: wall.accuracy(),
             of_map: spot.of_map,
             place: wall.along(self.position()),
         })
@@ -98,7 +97,7 @@ impl Viewpoint<'_> {
             on_wall,
             incidence: Radians(atan2(tangent.abs(), 1.0)),
             noise,
-            of_map: away.length_squared(),
+            of_map: self.echo.map_variance(wall.accuracy()) * away.length_squared(),
             expected,
         })
     }

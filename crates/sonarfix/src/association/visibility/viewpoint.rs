@@ -53,9 +53,7 @@ pub(crate) struct Sight {
     pub off: Radians,
     /// Variance of the range apart from that of the map, m².
     pub noise: f32,
-    /// Accuracy of the wall in the map, if it has one of its own.
-    pub accuracy: Option<Metres>,
-    /// Factor on the variance of the place of the wall in the map.
+    /// Variance of the range by the place of the wall in the map, m².
     pub of_map: f32,
     /// Place of the foot along the wall, also of light: what occludes a wall is remembered by where the robot was.
     pub place: Metres,
@@ -75,7 +73,7 @@ pub(crate) struct Viewpoint<'a> {
     /// Square of a distance from a limit at which it is certain to hold, whatever the direction of the wall.
     certain_squared: f32,
     /// What the echo model knows of the sensor.
-    echo: &'a EchoParameters,
+    pub(super) echo: &'a EchoParameters,
     /// Angle off the perpendicular at which half of the walls answer, and its variance, rad².
     half_angle: Radians,
     rim_squared: f32,
@@ -156,8 +154,7 @@ impl<'a> Viewpoint<'a> {
             square,
             off,
             noise,
-            accuracy: wall.accuracy(),
-            of_map: 1.0,
+            of_map: self.echo.map_variance(wall.accuracy()),
             place,
         })
     }

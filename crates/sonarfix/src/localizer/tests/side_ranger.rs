@@ -43,7 +43,7 @@ impl Measurement for SideDistance {
         let wall = robot.map.wall(self.wall).ok_or(Refusal::UnknownWall)?;
         let expected = ExpectedRange::new(&wall, self.mount, &robot.ekf.state());
         let noise = SquareMetres(self.deviation.0 * self.deviation.0);
-        Ok((View { expected, noise, ahead: None, measured: Ok(self.distance) }, ()))
+        Ok((View { expected, noise, repeated: 0.0, ahead: None, measured: Ok(self.distance) }, ()))
     }
 
     fn explain(
