@@ -225,7 +225,7 @@ mod tests {
             let ratio = 2.0 / f64::from(travelled);
             let repetition = if is_used { (1.0 + ratio * ratio).sqrt() } else { 1.0 };
             prop_assert!((f64::from(history.repetition(used)) / repetition - 1.0).abs() < 1e-5);
-            prop_assert!(history.repetition(WallId(2)) == 1.0);
+            prop_assert_eq!(history.repetition(WallId(2)).to_bits(), 1.0_f32.to_bits());
 
             let position = SonarPosition::new(config.rangers.first.mount, &ekf.state());
             let expected = ExpectedRange::from_sonar(&walls[0], &position);
