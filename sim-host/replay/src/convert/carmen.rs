@@ -168,7 +168,8 @@ impl Carmen<'_> {
             let line = content.scans.first().map_or(0, |scan| scan.line);
             report(line, &recognised.to_string());
             let scans = content.scans.iter_mut().map(|scan| &mut scan.time);
-            return Ok(corrected::trail(&content.samples, scans, converted, report));
+            return corrected::trail(&content.samples, scans, converted, report)
+                .map_err(|why| ConvertError::content(self.from, why));
         }
         content.in_order_of_time(converted);
         let samples = std::mem::take(&mut content.samples);

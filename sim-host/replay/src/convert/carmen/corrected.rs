@@ -5,6 +5,9 @@
 //! - the step from an `ODOM` record to a scan is the correction and no travel;
 //! - the pose from which the next `ODOM` record was reached is that of the scan;
 //! - the re-anchor is no record of its own.
+//!
+//! Some of these logs were written with six digits of the seconds since 1970, or without a clock: their stamps hardly ever advance, and
+//! the travel alone tells how time passes.
 
 use super::odometry::{MAX_SPEED, Record, Sample, Source, Step, Trail};
 use super::stamps::{self, JITTER};
@@ -17,6 +20,8 @@ const SHORTEST: f64 = 1e-3;
 /// Speed of the faster wheel that gives a step its least time, m/s. The robots of the public logs drive at less than 1 m/s; a step is shorter
 /// than its travel needs, if stamps that go back are averaged.
 const FAST: f64 = 2.5;
+/// The same of every step of a log without time, m/s: the mean of the public logs that have one is 0.3 to 0.6 m/s.
+const USUAL: f64 = 0.5;
 /// A stamp that goes back by more than this is wrong, seconds. Up to 1.9 s were seen in public logs.
 const LATE: f64 = 3.0;
 /// Difference of two times that is rounding, seconds.
@@ -73,16 +78,24 @@ struct Link {
 
 /// The wheel travel along the chain. Writes the time of each scan into `scans`, which are in the order of the file. A step that needs more
 /// time than its stamps have gets it.
+///
+/// # Errors
+/// What is wrong, if most scans have no record of the odometry since the scan before.
 pub fn trail<'a>(
     samples: &[Sample],
     mut scans: impl Iterator<Item = &'a mut f64>,
     converted: &mut Converted,
     report: &mut dyn FnMut(u64, &str),
-) -> Trail {
-    let links = links(samples, converted, report);
-    let mut chain = Chain::default();
-    let (mut restamped, mut first) = (0_u64, None);
-    let count = links.len() as u64;
+) -> Result<Trail, String> {
+    let mut links = links(samples, converted);
+    has_odometry(&links)?;
+    let is_timed = is_timed(&links, report);
+    if is_timed {
+        ascend(&mut links, report);
+    } else {
+        links.iter_mut().for_each(|link| link.sample.time = 0.0);
+    }
+    let mut chain = Chain { is_timed, ..Chain::default() };
     for Link { sample, stamp } in links {
         let time = match sample.source {
             Source::Odometry => chain.record(&sample, converted, report),
@@ -93,22 +106,56 @@ pub fn trail<'a>(
         {
             *of_scan = time;
         }
-        restamped += u64::from((time - stamp).abs() > SAME_TIME);
-        first.get_or_insert(sample.line);
+        converted.restamped += u64::from((time - stamp).abs() > SAME_TIME);
     }
-    converted.restamped += restamped;
-    if 2 * restamped > count {
+    Ok(Trail { records: chain.records, scans_are_corrected: true })
+}
+
+/// Whether most scans follow a record of the odometry.
+fn has_odometry(links: &[Link]) -> Result<(), String> {
+    let count = |before: Source| {
+        let sources = links.iter().map(|link| link.sample.source);
+        let pairs = sources.clone().zip(sources.skip(1));
+        pairs.filter(|pair| *pair == (before, Source::Scan)).count()
+    };
+    let [with, without] = [Source::Odometry, Source::Scan].map(count);
+    if with >= without {
+        return Ok(());
+    }
+    Err(format!(
+        "{without} of its {} scans have no ODOM record since the scan before: the wheel travel cannot be recovered",
+        with + without
+    ))
+}
+
+/// Whether the stamps of most records that the robot reached by driving are later than those before. Reports it if they are not.
+fn is_timed(links: &[Link], report: &mut dyn FnMut(u64, &str)) -> bool {
+    let records: Vec<&Link> =
+        links.iter().filter(|link| link.sample.source == Source::Odometry).collect();
+    let driven: Vec<f64> = records
+        .iter()
+        .zip(records.iter().skip(1))
+        .filter(|(from, to)| from.sample.pose != to.sample.pose)
+        .map(|(from, to)| to.stamp - from.stamp)
+        .collect();
+    let standing = driven.iter().filter(|seconds| **seconds <= SAME_TIME).count();
+    let is_timed = 2 * standing <= driven.len();
+    if let (false, Some(first)) = (is_timed, records.first()) {
         let what = format!(
-            "the stamps of {restamped} of {count} messages do not advance: their times are those of a drive at {FAST} metres per second"
+            "the stamps of {standing} of {} records do not advance, the log has no time: its times are those of a drive at {USUAL} metres \
+             per second",
+            driven.len()
         );
-        report(first.unwrap_or_default(), &what);
+        report(first.sample.line, &what);
     }
-    Trail { records: chain.records, scans_are_corrected: true }
+    is_timed
 }
 
 /// The chain of poses so far.
 #[derive(Default)]
 struct Chain {
+    /// Whether the stamps are times; without, the travel tells the time.
+    is_timed: bool,
     records: Vec<Record>,
     /// The pose from which the next record is reached.
     from: Option<Sample>,
@@ -141,7 +188,7 @@ impl Chain {
             return to.time;
         };
         let mut step = Step::between(&from, to);
-        step.seconds = to.time - last.time;
+        step.seconds = if self.is_timed { to.time - last.time } else { step.needs(USUAL) };
         let (travel, time) = if step.needs(MAX_SPEED) > step.seconds.max(0.0) + JITTER {
             converted.bridged += 1;
             report(to.line, &step.implausible());
@@ -160,15 +207,10 @@ impl Chain {
     }
 }
 
-/// The chain in the order of the file, its stamps ascending: those that go back get the closest ascending sequence.
-fn links(
-    samples: &[Sample],
-    converted: &mut Converted,
-    report: &mut dyn FnMut(u64, &str),
-) -> Vec<Link> {
+/// The chain in the order of the file.
+fn links(samples: &[Sample], converted: &mut Converted) -> Vec<Link> {
     let mut links: Vec<Link> = Vec::new();
     let mut anchor = None;
-    let mut latest = f64::NEG_INFINITY;
     for &sample in samples {
         let is_anchor = sample.source == Source::Odometry && anchor == Some(sample.pose);
         anchor = (sample.source == Source::Scan).then_some(sample.pose);
@@ -176,14 +218,20 @@ fn links(
             converted.repeated += 1;
             continue;
         }
-        let mut time = sample.time;
-        if time < latest - LATE {
+        links.push(Link { sample, stamp: sample.time });
+    }
+    links
+}
+
+/// Makes the times of the chain ascend: those that go back get the closest ascending sequence.
+fn ascend(links: &mut [Link], report: &mut dyn FnMut(u64, &str)) {
+    let mut latest = f64::NEG_INFINITY;
+    for Link { sample, .. } in links.iter_mut() {
+        if sample.time < latest - LATE {
             report(sample.line, "goes back in time: it gets the latest stamp before it");
-            time = latest;
+            sample.time = latest;
         }
-        latest = latest.max(time);
-        links.push(Link { sample: Sample { time, ..sample }, stamp: sample.time });
+        latest = latest.max(sample.time);
     }
     stamps::repair(links.iter_mut().map(|link| &mut link.sample.time));
-    links
 }
