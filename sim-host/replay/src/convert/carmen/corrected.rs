@@ -93,7 +93,9 @@ pub fn trail<'a>(
     if is_timed {
         ascend(&mut links, report);
     } else {
-        links.iter_mut().for_each(|link| link.sample.time = 0.0);
+        for link in &mut links {
+            link.sample.time = 0.0;
+        }
     }
     let mut chain = Chain { is_timed, ..Chain::default() };
     for Link { sample, stamp } in links {
