@@ -275,33 +275,61 @@ fn stamps_of_a_continued_log_that_go_back_get_the_time_that_the_travel_needs() {
     assert!((travelled(&dir)[1] - 0.205).abs() < 1e-6, "{:?}", travelled(&dir));
 }
 
+/// A robot that drives ahead with an `ODOM` record every 0.1 m, and after each third one a scan that moves it 3 cm to the side. The stamp of
+/// each record is that of its number; `is_continued`: a record with the pose of the scan follows it.
+fn stamped(stamp: impl Fn(u32) -> String, is_continued: bool) -> String {
+    let mut log = String::new();
+    for record in 0_u32..31 {
+        let (ahead, aside, time) = (f64::from(record) / 10.0, record / 3, stamp(record));
+        let after =
+            if record % 3 == 0 { f64::from(aside) * 0.03 } else { f64::from(aside + 1) * 0.03 };
+        writeln!(log, "ODOM {ahead} {after} 0 0 0 0 {time} host {time}").unwrap();
+        if record % 3 == 0 {
+            let pose = format!("{ahead} {} 0", f64::from(aside + 1) * 0.03);
+            writeln!(log, "FLASER 3 2 9 2 {pose} {pose} {time} host {time}").unwrap();
+            if is_continued {
+                writeln!(log, "ODOM {pose} 0 0 0 0 host 0").unwrap();
+            }
+        }
+    }
+    log
+}
+
 /// Six digits of the seconds since 1970 advance once in 10,000 s.
 #[test]
 fn a_continued_log_without_time_gets_that_of_a_drive() {
-    let log = chained("0")
-        .replace(" 10.0 host 10.0", " 1.13486e+09 host 1.13486e+09")
-        .replace(" 10.2 host 10.2", " 1.13486e+09 host 1.13486e+09")
-        .replace(" 10.4 host 10.4", " 1.13486e+09 host 1.13486e+09")
-        .replace(" 10.6 host 10.6", " 1.13486e+09 host 1.13486e+09")
-        .replace(" 11.0 host 11.0", " 1.13487e+09 host 1.13487e+09");
-    let (dir, converted, reported) = carmen(&log);
+    let six_digits = |record| if record < 20 { "1.13486e+09" } else { "1.13487e+09" }.to_owned();
+    let (dir, converted, reported) = carmen(&stamped(six_digits, true));
     assert_eq!((converted.unwrap().bridged, reported.len()), (0, 2), "{reported:?}");
-    assert!(
-        reported[1].starts_with("made.log line 2: the stamps of 3 of 4 records do not advance"),
-        "{reported:?}"
-    );
+    let told = "made.log line 1: the stamps of 29 of 30 records do not advance: the log has no time; its times are those of a drive at 0.5 ";
+    assert!(reported[1].starts_with(told), "{reported:?}");
     let records = records(&dir);
-    let wheels: Vec<&String> = records.iter().filter(|line| line.starts_with("wheels")).collect();
-    // 0.1 m three times and 0.095 m at 0.5 m/s, the 10,000 s are no time.
-    let expected = [
-        "wheels,0.000000,0.000000,0.000000",
-        "wheels,0.200000,0.100000,0.100000",
-        "wheels,0.400000,0.200000,0.200000",
-        "wheels,0.600000,0.300000,0.300000",
-        "wheels,0.790000,0.395000,0.205000",
-    ];
-    assert_eq!(wheels, expected);
-    assert!(records.iter().any(|line| line.starts_with("scan,0.400000,")), "{records:?}");
+    let at = |kind: &str, time: &str| {
+        records.iter().any(|line| line.starts_with(&format!("{kind},{time},")))
+    };
+    // 3 m at 0.5 m/s: the 10,000 s are no time.
+    assert!(
+        at("wheels", "0.000000") && at("scan", "0.600000") && at("wheels", "6.000000"),
+        "{records:?}"
+    );
+    assert!(records.last().unwrap().starts_with("scan,6.000000,"), "{records:?}");
+}
+
+#[test]
+fn stamps_of_whole_seconds_are_times() {
+    let (dir, _, reported) = carmen(&stamped(|record| (record / 5).to_string(), true));
+    assert_eq!(reported.len(), 1, "{reported:?}");
+    assert!(records(&dir).iter().any(|line| line.starts_with("wheels,5.000000,")));
+}
+
+#[test]
+fn a_raw_log_without_time_is_refused() {
+    let (_dir, converted, _) = carmen(&stamped(|_| "1.13486e+09".to_owned(), false));
+    let why = converted.unwrap_err().to_string();
+    assert!(
+        why.contains("the stamps of 30 of 30 records do not advance: the log has no time"),
+        "{why}"
+    );
 }
 
 #[test]

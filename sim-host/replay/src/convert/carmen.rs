@@ -171,6 +171,9 @@ impl Carmen<'_> {
             return corrected::trail(&content.samples, scans, converted, report)
                 .map_err(|why| ConvertError::content(self.from, why));
         }
+        if let Some(missing) = stamps::NoTime::of(content.samples.iter()) {
+            return Err(ConvertError::content(self.from, missing.to_string()));
+        }
         content.in_order_of_time(converted);
         let samples = std::mem::take(&mut content.samples);
         Trail::of(samples, converted, report).map_err(|why| ConvertError::content(self.from, why))

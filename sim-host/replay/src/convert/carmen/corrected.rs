@@ -89,13 +89,19 @@ pub fn trail<'a>(
 ) -> Result<Trail, String> {
     let mut links = links(samples, converted);
     has_odometry(&links)?;
-    let is_timed = is_timed(&links, report);
-    if is_timed {
-        ascend(&mut links, report);
-    } else {
+    let missing = stamps::NoTime::of(links.iter().map(|link| &link.sample));
+    let is_timed = missing.is_none();
+    if let Some(missing) = missing {
+        let line = links.first().map_or(0, |link| link.sample.line);
+        report(
+            line,
+            &format!("{missing}; its times are those of a drive at {USUAL} metres per second"),
+        );
         for link in &mut links {
             link.sample.time = 0.0;
         }
+    } else {
+        ascend(&mut links, report);
     }
     let mut chain = Chain { is_timed, ..Chain::default() };
     for Link { sample, stamp } in links {
@@ -128,29 +134,6 @@ fn has_odometry(links: &[Link]) -> Result<(), String> {
         "{without} of its {} scans have no ODOM record since the scan before: the wheel travel cannot be recovered",
         with + without
     ))
-}
-
-/// Whether the stamps of most records that the robot reached by driving are later than those before. Reports it if they are not.
-fn is_timed(links: &[Link], report: &mut dyn FnMut(u64, &str)) -> bool {
-    let records: Vec<&Link> =
-        links.iter().filter(|link| link.sample.source == Source::Odometry).collect();
-    let driven: Vec<f64> = records
-        .iter()
-        .zip(records.iter().skip(1))
-        .filter(|(from, to)| from.sample.pose != to.sample.pose)
-        .map(|(from, to)| to.stamp - from.stamp)
-        .collect();
-    let standing = driven.iter().filter(|seconds| **seconds <= SAME_TIME).count();
-    let is_timed = 2 * standing <= driven.len();
-    if let (false, Some(first)) = (is_timed, records.first()) {
-        let what = format!(
-            "the stamps of {standing} of {} records do not advance, the log has no time: its times are those of a drive at {USUAL} metres \
-             per second",
-            driven.len()
-        );
-        report(first.sample.line, &what);
-    }
-    is_timed
 }
 
 /// The chain of poses so far.

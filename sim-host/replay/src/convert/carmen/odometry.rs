@@ -29,7 +29,7 @@ const SIDEWAYS: f64 = 0.01;
 const SIDEWAYS_RATIO: f64 = 3.0;
 const SIDEWAYS_SHARE: f64 = 0.02;
 /// Number of steps from which their statistics decide.
-const ENOUGH: usize = 20;
+pub const ENOUGH: usize = 20;
 /// A step shorter than this is not tested for sideways motion, metres.
 const STANDING: f64 = 0.01;
 
