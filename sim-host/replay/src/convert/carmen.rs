@@ -28,6 +28,7 @@
 
 mod corrected;
 mod message;
+mod no_time;
 mod odometry;
 pub(super) mod robot;
 mod stamps;
@@ -44,6 +45,7 @@ use crate::lines::Lines;
 use crate::log::Malformed;
 use crate::scan::Scan;
 use message::Message;
+use no_time::NoTime;
 use odometry::{Sample, Source, Trail};
 
 pub use odometry::TRACK_WIDTH;
@@ -171,7 +173,7 @@ impl Carmen<'_> {
             return corrected::trail(&content.samples, scans, converted, report)
                 .map_err(|why| ConvertError::content(self.from, why));
         }
-        if let Some(missing) = stamps::NoTime::of(content.samples.iter()) {
+        if let Some(missing) = NoTime::of(content.samples.iter()) {
             return Err(ConvertError::content(self.from, missing.to_string()));
         }
         content.in_order_of_time(converted);

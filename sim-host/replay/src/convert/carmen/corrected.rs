@@ -9,6 +9,7 @@
 //! Some of these logs were written with six digits of the seconds since 1970, or without a clock: their stamps hardly ever advance, and
 //! the travel alone tells how time passes.
 
+use super::no_time::NoTime;
 use super::odometry::{MAX_SPEED, Record, Sample, Source, Step, Trail};
 use super::stamps::{self, JITTER};
 use crate::convert::Converted;
@@ -89,7 +90,7 @@ pub fn trail<'a>(
 ) -> Result<Trail, String> {
     let mut links = links(samples, converted);
     has_odometry(&links)?;
-    let missing = stamps::NoTime::of(links.iter().map(|link| &link.sample));
+    let missing = NoTime::of(links.iter().map(|link| &link.sample));
     let is_timed = missing.is_none();
     if let Some(missing) = missing {
         let line = links.first().map_or(0, |link| link.sample.line);
